@@ -1,0 +1,14 @@
+#include "supple/blas.hpp"
+
+#include "core.hpp"
+
+void bind_blas(py::module_& module) {
+  using supple::BlasReport;
+  py::class_<BlasReport>(module, "BlasReport")
+      .def_readonly("core", &BlasReport::core)
+      .def_readonly("config", &BlasReport::config)
+      .def_readonly("threads", &BlasReport::threads)
+      .def_readonly("gflops", &BlasReport::gflops);
+  module.def("blas_report", &supple::blas_report);
+  module.def("set_blas_threads", &supple::set_blas_threads);
+}

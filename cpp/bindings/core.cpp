@@ -1,0 +1,10 @@
+#include "core.hpp"
+
+#include "supple/error.hpp"
+
+PYBIND11_MODULE(_core, module) {
+  py::register_exception<supple::Error>(module, "Error", PyExc_RuntimeError);
+  bind_system(module);
+  bind_closest_point(module);
+  bind_blas(module);
+}

@@ -1,0 +1,24 @@
+/// What the binding files share.
+#pragma once
+
+#include <pybind11/eigen.h>
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "supple/sparse.hpp"
+
+namespace py = pybind11;
+
+/// A (k, m) int32 array, row-major.
+using CellArray = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
+
+/// The array as the runtime's connectivity.
+inline supple::Connectivity connectivity(const CellArray& cells) {
+  return Eigen::Map<const supple::Connectivity>(cells.data(), cells.shape(0), cells.shape(1));
+}
+
+void bind_system(py::module_& module);
+void bind_closest_point(py::module_& module);
+void bind_blas(py::module_& module);

@@ -1,0 +1,147 @@
+#include "supple/system.hpp"
+
+#include <omp.h>
+
+#include "core.hpp"
+#include "supple/kernel_term.hpp"
+#include "supple/newton.hpp"
+#include "supple/sliding.hpp"
+
+namespace {
+
+using supple::Vector;
+
+/// Hands each iteration to Python and lets Ctrl-C through.
+supple::Progress python_progress(const py::object& callback) {
+  return [&callback](const supple::Iteration& iteration) {
+    const py::gil_scoped_acquire gil;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (!callback.is_none()) callback(iteration);
+  };
+}
+
+supple::NewtonResult solve(supple::System& system, const Vector& start, const Vector& prescribed,
+                           const supple::NewtonSettings& settings, const py::object& progress) {
+  const supple::Progress report = python_progress(progress);
+  const py::gil_scoped_release release;
+  return supple::solve(system, start, prescribed, settings, report);
+}
+
+py::tuple tangent(supple::System& system, const Vector& u) {
+  const Vector values = system.assemble_tangent(u, 1.0);
+  const supple::BlockPattern& pattern = system.pattern();
+  return py::make_tuple(values, py::array(py::cast(pattern.column)),
+                        py::array(py::cast(pattern.row_start)));
+}
+
+void bind_terms(py::module_& module) {
+  py::class_<supple::VolumeRatio>(module, "VolumeRatio")
+      .def_readonly("value", &supple::VolumeRatio::value)
+      .def_readonly("cell", &supple::VolumeRatio::cell);
+  py::class_<supple::Term, std::shared_ptr<supple::Term>>(module, "Term")
+      .def_readwrite("is_load", &supple::Term::is_load)
+      .def("energy", &supple::Term::energy)
+      .def("residual",
+           [](const supple::Term& term, const Vector& u) {
+             Vector r = Vector::Zero(u.size());
+             term.residual(u, 1.0, r);
+             return r;
+           })
+      .def("volume_ratio", &supple::Term::volume_ratio);
+  py::class_<supple::NodalForce, supple::Term, std::shared_ptr<supple::NodalForce>>(module,
+                                                                                   "NodalForce")
+      .def(py::init<Vector>())
+      .def("set_forces", &supple::NodalForce::set_forces);
+  py::class_<supple::KernelTerm, supple::Term, std::shared_ptr<supple::KernelTerm>>(module,
+                                                                                   "KernelTerm")
+      .def(py::init([](const std::string& library, const supple::System& system,
+                       const CellArray& cells) {
+        return std::make_shared<supple::KernelTerm>(supple::KernelLibrary::load(library),
+                                                    system.points(), connectivity(cells));
+      }))
+      .def("set_field", &supple::KernelTerm::set_field)
+      .def("tabulate", &supple::KernelTerm::tabulate)
+      .def_property_readonly("weights", [](const supple::KernelTerm& term) {
+        const supple_library& table = term.library().table();
+        return Vector(Eigen::Map<const Vector>(table.weights, table.point_count));
+      });
+  py::class_<supple::Sliding, supple::Term, std::shared_ptr<supple::Sliding>>(module, "Sliding")
+      .def(py::init([](const supple::System& system, std::vector<supple::Index> nodes,
+                       const Vector& stiffness, const supple::Points& vertices,
+                       const supple::Triangles& triangles, bool inverse) {
+        return std::make_shared<supple::Sliding>(system.points(), std::move(nodes), stiffness,
+                                                 vertices, triangles, inverse);
+      }));
+}
+
+void bind_newton(py::module_& module) {
+  using supple::Iteration;
+  using supple::NewtonResult;
+  using supple::NewtonSettings;
+  using supple::Outcome;
+  py::enum_<Outcome>(module, "Outcome")
+      .value("converged", Outcome::Converged)
+      .value("unstable", Outcome::Unstable)
+      .value("inverted", Outcome::Inverted)
+      .value("singular", Outcome::Singular)
+      .value("limit_point", Outcome::LimitPoint)
+      .value("stalled", Outcome::Stalled);
+  py::class_<NewtonSettings>(module, "NewtonSettings")
+      .def(py::init<>())
+      .def_readwrite("rtol", &NewtonSettings::rtol)
+      .def_readwrite("atol", &NewtonSettings::atol)
+      .def_readwrite("step_tol", &NewtonSettings::step_tol)
+      .def_readwrite("size", &NewtonSettings::size)
+      .def_readwrite("max_iterations", &NewtonSettings::max_iterations)
+      .def_readwrite("load_steps", &NewtonSettings::load_steps)
+      .def_readwrite("smallest_step", &NewtonSettings::smallest_step)
+      .def_readwrite("refuse_inversion", &NewtonSettings::refuse_inversion)
+      .def_readwrite("warm", &NewtonSettings::warm);
+  py::class_<Iteration>(module, "Iteration")
+      .def_readonly("load_factor", &Iteration::load_factor)
+      .def_readonly("iteration", &Iteration::iteration)
+      .def_readonly("residual", &Iteration::residual)
+      .def_readonly("tolerance", &Iteration::tolerance)
+      .def_readonly("step", &Iteration::step)
+      .def_readonly("length", &Iteration::length)
+      .def_readonly("shift", &Iteration::shift);
+  py::class_<NewtonResult>(module, "NewtonResult")
+      .def_readonly("outcome", &NewtonResult::outcome)
+      .def_readonly("u", &NewtonResult::u)
+      .def_readonly("load_factor", &NewtonResult::load_factor)
+      .def_readonly("residual", &NewtonResult::residual)
+      .def_readonly("history", &NewtonResult::history)
+      .def_readonly("worst", &NewtonResult::worst)
+      .def_readonly("last_residual", &NewtonResult::last_residual)
+      .def_readonly("negative", &NewtonResult::negative);
+}
+
+}  // namespace
+
+void bind_system(py::module_& module) {
+  using supple::System;
+  bind_terms(module);
+  bind_newton(module);
+  py::class_<supple::Timings>(module, "Timings")
+      .def_readonly("assembly", &supple::Timings::assembly)
+      .def_readonly("factor", &supple::Timings::factor)
+      .def_readonly("solve", &supple::Timings::solve)
+      .def_readonly("total", &supple::Timings::total);
+  py::class_<System>(module, "System")
+      .def(py::init([](Vector points) {
+        return std::make_unique<System>(std::make_shared<const Vector>(std::move(points)));
+      }))
+      .def("add", &System::add)
+      .def("set_free", &System::set_free)
+      .def("energy", &System::energy)
+      .def("residual", &System::residual)
+      .def("external", &System::external)
+      .def("volume_ratio", &System::volume_ratio)
+      .def("tangent", &tangent)
+      .def("has_energy", &System::has_energy)
+      .def("reset_timings", [](System& system) { system.timings = {}; })
+      .def_readonly("timings", &System::timings)
+      .def("solve", &solve);
+  module.def("set_threads", [](int threads) { omp_set_num_threads(threads); });
+  module.def("threads", [] { return omp_get_max_threads(); });
+}

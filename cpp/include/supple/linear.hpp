@@ -1,0 +1,98 @@
+/// Direct solvers for the reduced matrix: one symbolic analysis, many factorisations, many solves.
+///
+///     Reduction reduction = reduce(pattern, free, storage(kind));
+///     Factor factor(kind);
+///     factor.analyse(reduction.pattern);
+///     reduction.gather(values, reduced);
+///     if (FactorStatus status = factor.factorise(reduced); status.ok()) factor.solve(rhs, x);
+///
+/// SuiteSparse's 64-bit interface throughout: a factor of a 3-D body has 10² to 10³ times the
+/// entries of its matrix and passes 2³¹ entries (16 GB) where the matrix itself is far from it.
+#pragma once
+
+#include <memory>
+
+#include "supple/sparse.hpp"
+
+namespace supple {
+
+/// What is known about the matrix, by the origin of its terms and never by trial.
+enum class Kind {
+  Cholesky,      ///< symmetric positive definite: supernodal LLᵀ (CHOLMOD)
+  QuasiDefinite, ///< symmetric indefinite: simplicial LDLᵀ without pivoting, refined (CHOLMOD)
+  Unsymmetric    ///< LU with partial pivoting (UMFPACK)
+};
+
+/// Which part of the reduced matrix a factor of this kind reads.
+inline Storage storage(Kind kind) {
+  return kind == Kind::Unsymmetric ? Storage::Full : Storage::Lower;
+}
+
+/// Outcome of a factorisation; a matrix that cannot be factorised is an answer, not an exception.
+struct FactorStatus {
+  enum class Cause { None, NotPositiveDefinite, Singular, NotFinite };
+  Cause cause = Cause::None;
+  std::int64_t unknown = -1; ///< the unknown at which it failed (row of the reduced matrix), or −1
+
+  bool ok() const { return cause == Cause::None; }
+};
+
+/// Signs of the pivots of LDLᵀ, which are those of the eigenvalues (Sylvester).
+struct Inertia {
+  std::int64_t negative = 0, zero = 0, positive = 0;
+  double growth =
+      0.0; ///< max (|L||D||Lᵀ|)ᵢᵢ / max |A|: 1 is ideal, above ~1e8 the signs are doubtful
+};
+
+/// When iterative refinement stops; it always stops when the residual no longer halves.
+struct Refinement {
+  /// ‖b − Ax‖₂ ≤ tolerance·‖b‖₂; 0 asks for rounding: ‖b − Ax‖∞ ≤ ε (‖A‖∞‖x‖∞ + ‖b‖∞).
+  double tolerance = 0.0;
+  int max_steps = 10;
+};
+
+/// What a solve did.
+struct SolveReport {
+  double residual = 0.0; ///< ‖b − Ax‖₂ / ‖b‖₂ at the returned x; 0 where b = 0
+  double backward = 0.0; ///< ‖b − Ax‖∞ / (‖A‖∞‖x‖∞ + ‖b‖∞)
+  int steps = 0;         ///< refinement steps kept
+};
+
+/// A factorisation of one kind; not to be used by two threads at once.
+class Factor {
+ public:
+  explicit Factor(Kind kind);
+  Factor(Factor&&) noexcept;
+  Factor& operator=(Factor&&) noexcept;
+  ~Factor();
+
+  /// Order and symbolically factorise; kept until the next analyse.
+  ///
+  /// AMD and METIS on the graph of the groups; the one with fewer flops is kept.
+  /// @throws ShapeError if the pattern's storage does not fit the kind; NumericalError out of
+  /// memory.
+  void analyse(const CscPattern& pattern);
+
+  /// Numeric factorisation of the values (pattern.nonzeros()) on the analysed pattern.
+  /// @throws StateError before analyse; ShapeError on a wrong size; NumericalError out of memory.
+  FactorStatus factorise(const ConstVector& values);
+
+  /// x = A⁻¹ rhs, refined with the values of the last factorise.
+  /// @throws StateError unless the last factorise was ok; ShapeError on a wrong size.
+  SolveReport solve(const ConstVector& rhs, MutableVector x, const Refinement& refinement = {});
+
+  /// @throws StateError unless the kind is QuasiDefinite and the last factorise was ok.
+  Inertia inertia() const;
+
+  Kind kind() const;
+  std::int64_t size() const;    ///< number of unknowns
+  double flops() const;         ///< of one factorisation, as the analysis counts them
+  double nonzeros() const;      ///< entries of L, or of L + U
+  const char* ordering() const; ///< "AMD", "METIS", … that the analysis kept
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+} // namespace supple

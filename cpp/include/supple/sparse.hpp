@@ -1,0 +1,131 @@
+/// Sparsity of a mesh: node graph, CSR pattern, scatter maps, reduction to free dofs, colours.
+///
+/// Conventions: a node has three dofs, node-major (dof 3a + i is direction i of node a). The global
+/// matrix is CSR, unsymmetric pattern in general, columns ascending; its three rows of node a lie
+/// one after the other and have equal length, so block (a, b) starts at one position and its next
+/// row is `row_stride` further on.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <Eigen/Core>
+#include <vector>
+
+namespace supple {
+
+using Index = std::int32_t;
+/// (cells, nodes per cell) node numbers of each cell.
+using Connectivity = Eigen::Matrix<Index, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+/// (dofs) true where the dof is free.
+using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
+using Vector = Eigen::VectorXd;
+using ConstVector = Eigen::Ref<const Eigen::VectorXd>;
+using MutableVector = Eigen::Ref<Eigen::VectorXd>;
+
+/// Where the cell matrices of one connectivity go in the global CSR values.
+struct Scatter {
+  Index cells = 0;
+  Index nodes_per_cell = 0;      ///< m
+  std::vector<Index> position;   ///< (cells, m, m) first entry of block (a, b)
+  std::vector<Index> row_stride; ///< (cells, m) from one row of local node a to its next row
+};
+
+/// Node graph of a mesh and the CSR pattern of its stiffness matrix.
+struct BlockPattern {
+  Index nodes = 0;
+  std::vector<Index> node_start; ///< (nodes + 1) offsets into `neighbour`
+  std::vector<Index> neighbour;  ///< nodes that share a cell with a node, itself too, ascending
+  std::vector<Index> row_start;  ///< (3 nodes + 1) CSR offsets
+  std::vector<Index> column;     ///< (nonzeros) CSR columns
+  std::vector<Scatter> scatter;  ///< one for each connectivity, in the order given
+
+  Index dofs() const { return 3 * nodes; }
+  Index nonzeros() const { return static_cast<Index>(column.size()); }
+  /// From one row of node `a` to its next row: 3 × the number of its neighbours.
+  Index row_stride(Index a) const;
+  /// First entry of block (a, b) in the CSR values, −1 if the nodes share no cell.
+  Index position(Index a, Index b) const;
+};
+
+/// Pattern of a mesh with `nodes` nodes, and the scatter map of each connectivity.
+///
+/// A node without cells keeps its diagonal block. Cost O(cells m² log).
+/// @throws ShapeError if a cell names a node outside [0, nodes) or the matrix exceeds 2³¹ entries.
+BlockPattern block_pattern(Index nodes, const std::vector<Connectivity>& connectivities);
+
+/// values += cell matrix: entry (r, c) of the (3m × 3m) row-major matrix is `matrix[(r·3m +
+/// c)·step]`.
+///
+/// `step` is 1 for one cell, the number of lanes for cells in lanes. Neither allocates nor locks:
+/// cells that share a node must not be scattered at once (see colour_cells).
+inline void scatter_add(const Scatter& map, Index cell, const double* matrix, double* values,
+                        std::ptrdiff_t step = 1) {
+  const auto m = static_cast<std::ptrdiff_t>(map.nodes_per_cell);
+  const Index* position = map.position.data() + cell * m * m;
+  const Index* row_stride = map.row_stride.data() + cell * m;
+  for (std::ptrdiff_t a = 0; a < m; ++a) {
+    for (std::ptrdiff_t i = 0; i < 3; ++i) {
+      const double* row = matrix + (3 * a + i) * 3 * m * step;
+      double* target = values + i * row_stride[a];
+      for (std::ptrdiff_t b = 0; b < m; ++b) {
+        double* block = target + position[a * m + b];
+        for (std::ptrdiff_t j = 0; j < 3; ++j)
+          block[j] += row[(3 * b + j) * step];
+      }
+    }
+  }
+}
+
+/// y = K x with the CSR values of `pattern`; the sum of each row is in a fixed order.
+/// @throws ShapeError if a size does not fit.
+void multiply(const BlockPattern& pattern, const ConstVector& values, const ConstVector& x,
+              MutableVector y);
+
+/// Pattern of a sparse matrix by columns, rows ascending, with the group (node) of each unknown.
+struct CscPattern {
+  std::int64_t size = 0;
+  std::vector<std::int64_t> start; ///< (size + 1) offsets of the columns
+  std::vector<std::int64_t> row;   ///< (nonzeros) rows, ascending in a column
+  std::vector<Index> group;        ///< (size) unknowns of one group have equal neighbours; or empty
+  bool lower = false;              ///< only row ≥ column is stored, the matrix is symmetric
+
+  std::int64_t nonzeros() const { return static_cast<std::int64_t>(row.size()); }
+};
+
+/// Which part of the reduced matrix is stored.
+enum class Storage { Lower, Full };
+
+/// The free dofs and where the reduced matrix finds its values; made once per boundary condition.
+struct Reduction {
+  std::vector<Index> dof;     ///< (free) dof of each unknown, ascending
+  std::vector<Index> unknown; ///< (dofs) unknown of each dof, −1 where fixed
+  CscPattern pattern;         ///< of the reduced matrix
+  std::vector<Index> source;  ///< (reduced nonzeros) position in the CSR values
+
+  Index free() const { return static_cast<Index>(dof.size()); }
+  /// reduced = the reduced matrix's values, taken from the CSR `values`; no search, no allocation.
+  /// Storage::Lower reads the upper triangle of the rows, which holds the same numbers.
+  void gather(const ConstVector& values, MutableVector reduced) const;
+  /// Entries of the free dofs.
+  Vector restrict(const ConstVector& full) const;
+  /// full[free dofs] += scale · reduced.
+  void add_to(const ConstVector& reduced, double scale, MutableVector full) const;
+};
+
+/// @throws ShapeError if `free` does not have one entry for each dof.
+Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage);
+
+/// Batches of cells in the order of their colours; batches of one colour share no node.
+struct Colouring {
+  std::vector<Index> order;  ///< (batches) batch numbers; batch k is cells [k·batch, (k+1)·batch)
+  std::vector<Index> offset; ///< (colours + 1) colour c is order[offset[c] … offset[c+1])
+
+  Index colours() const { return static_cast<Index>(offset.size()) - 1; }
+};
+
+/// Greedy first-fit colouring in the order of the cells: depends on nothing but its arguments.
+/// With `batch` = 1 a batch is a cell.
+/// @throws ShapeError if a cell names a node outside [0, nodes), or batch < 1.
+Colouring colour_cells(const Connectivity& cells, Index nodes, Index batch = 1);
+
+} // namespace supple

@@ -1,0 +1,69 @@
+/// All terms of one body on shared dofs, with pattern, reduction and factor kept between solves.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "supple/linear.hpp"
+#include "supple/term.hpp"
+
+namespace supple {
+
+/// Seconds spent in the phases of a solve.
+struct Timings {
+  double assembly = 0.0, factor = 0.0, solve = 0.0, total = 0.0;
+};
+
+class System {
+ public:
+  /// @param points (3n) coordinates of the mesh, m, node-major.
+  explicit System(std::shared_ptr<const Vector> points) : points_(std::move(points)) {}
+
+  /// Add a term; the pattern is made anew at the next use.
+  void add(std::shared_ptr<Term> term);
+  /// Which dofs are free (3n); the reduction and the symbolic factor are made anew if it changes.
+  /// @throws ShapeError on a wrong size.
+  void set_free(Mask free);
+
+  Index dofs() const { return static_cast<Index>(points_->size()); }
+  const std::shared_ptr<const Vector>& points() const { return points_; }
+  /// All terms have a potential, so energy() is that of residual().
+  bool has_energy() const;
+  /// By the origin of the terms: Cholesky where all are symmetric, else Unsymmetric.
+  Kind kind() const;
+
+  /// Potential energy, loads scaled by `load_factor`, J.
+  double energy(const ConstVector& u, double load_factor) const;
+  /// R (3n), N, loads scaled.
+  Vector residual(const ConstVector& u, double load_factor) const;
+  /// External force alone, −R of the loads at factor 1 (3n), N.
+  Vector external(const ConstVector& u) const;
+  VolumeRatio volume_ratio(const ConstVector& u) const;
+
+  const BlockPattern& pattern();
+  /// CSR values on pattern() of K at u.
+  const Vector& assemble_tangent(const ConstVector& u, double load_factor);
+
+  const Reduction& reduction();
+  /// Factorise the reduced tangent last assembled, plus `shift` times its diagonal's mean size.
+  FactorStatus factorise(double shift = 0.0);
+  /// x (3n), 0 at fixed dofs, from the last factor; `rhs` (3n).
+  Vector solve(const ConstVector& rhs);
+  /// (values of K)·x on all dofs, from the tangent last assembled.
+  Vector apply(const ConstVector& x);
+  /// Negative eigenvalues of the reduced tangent last assembled (symmetric kinds only).
+  Inertia inertia();
+
+  Timings timings;
+
+ private:
+  std::shared_ptr<const Vector> points_;
+  std::vector<std::shared_ptr<Term>> terms_;
+  Mask free_;
+  std::unique_ptr<BlockPattern> pattern_;
+  std::unique_ptr<Reduction> reduction_;
+  std::unique_ptr<Factor> factor_;
+  Vector values_, reduced_;
+};
+
+}  // namespace supple

@@ -1,0 +1,66 @@
+/// A contribution to the equilibrium R(u) = 0: internal forces, loads, skin, supports.
+#pragma once
+
+#include <limits>
+#include <string>
+
+#include "supple/sparse.hpp"
+
+namespace supple {
+
+/// Smallest volume ratio of a term's cells and where it is.
+struct VolumeRatio {
+  double value = std::numeric_limits<double>::infinity();
+  Index cell = -1;
+};
+
+/// What a term does with u, node-major displacements of all nodes (3n).
+///
+/// Signs: residual = internal − external force. Thread counts do not change a result: sums run over
+/// batches of cells in a fixed order.
+class Term {
+ public:
+  virtual ~Term() = default;
+
+  /// (cells, nodes per cell) nodes whose dofs this term couples; has no rows for a constant term.
+  virtual const Connectivity& cells() const = 0;
+  /// Whether energy() is the potential of residual().
+  virtual bool has_energy() const = 0;
+  /// Whether the tangent is symmetric.
+  virtual bool symmetric() const = 0;
+  virtual double energy(const ConstVector& u) const = 0;
+  /// r += scale · residual.
+  virtual void residual(const ConstVector& u, double scale, MutableVector r) const = 0;
+  /// values += scale · tangent, at the places that `map` gives.
+  virtual void tangent(const ConstVector& u, double scale, const Scatter& map,
+                       MutableVector values) const = 0;
+  /// Smallest J over the points of the cells; infinity for a term without volume.
+  virtual VolumeRatio volume_ratio(const ConstVector& u) const = 0;
+
+  /// Whether the load factor scales this term.
+  bool is_load = false;
+};
+
+/// Forces on nodes that depend on nothing.
+class NodalForce final : public Term {
+ public:
+  /// @param forces (3n) N, node-major.
+  explicit NodalForce(Vector forces) : forces_(std::move(forces)) { is_load = true; }
+  void set_forces(Vector forces) { forces_ = std::move(forces); }
+
+  const Connectivity& cells() const override { return cells_; }
+  bool has_energy() const override { return true; }
+  bool symmetric() const override { return true; }
+  double energy(const ConstVector& u) const override { return -forces_.dot(u); }
+  void residual(const ConstVector&, double scale, MutableVector r) const override {
+    r -= scale * forces_;
+  }
+  void tangent(const ConstVector&, double, const Scatter&, MutableVector) const override {}
+  VolumeRatio volume_ratio(const ConstVector&) const override { return {}; }
+
+ private:
+  Vector forces_;
+  Connectivity cells_;
+};
+
+}  // namespace supple

@@ -1,0 +1,42 @@
+#include "node_cells.hpp"
+
+#include <string>
+
+#include "supple/error.hpp"
+
+namespace supple {
+namespace {
+
+void check_nodes(const Connectivity& cells, Index nodes) {
+  if (cells.size() == 0) return;
+  const Index low = cells.minCoeff();
+  const Index high = cells.maxCoeff();
+  if (low >= 0 && high < nodes) return;
+  throw ShapeError("cells must name nodes from 0 to " + std::to_string(nodes - 1) + ", got " +
+                   std::to_string(low < 0 ? low : high) +
+                   "; give the number of nodes that the points have, or renumber the cells");
+}
+
+} // namespace
+
+NodeCells node_cells(Index nodes, const std::vector<Connectivity>& connectivities) {
+  for (const Connectivity& cells : connectivities)
+    check_nodes(cells, nodes);
+  NodeCells map;
+  map.start.assign(static_cast<std::size_t>(nodes) + 1, 0);
+  for (const Connectivity& cells : connectivities)
+    for (Eigen::Index k = 0; k < cells.size(); ++k)
+      ++map.start[static_cast<std::size_t>(cells.data()[k]) + 1];
+  for (std::size_t n = 0; n < static_cast<std::size_t>(nodes); ++n)
+    map.start[n + 1] += map.start[n];
+  map.cell.resize(static_cast<std::size_t>(map.start.back()));
+  std::vector<Index> next(map.start.begin(), map.start.end() - 1);
+  Index number = 0;
+  for (const Connectivity& cells : connectivities)
+    for (Eigen::Index c = 0; c < cells.rows(); ++c, ++number)
+      for (Eigen::Index a = 0; a < cells.cols(); ++a)
+        map.cell[static_cast<std::size_t>(next[static_cast<std::size_t>(cells(c, a))]++)] = number;
+  return map;
+}
+
+} // namespace supple

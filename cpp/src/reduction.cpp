@@ -1,0 +1,97 @@
+#include "supple/error.hpp"
+#include "supple/sparse.hpp"
+
+namespace supple {
+namespace {
+
+std::vector<Index> number_free(const Mask& free, std::vector<Index>& dof) {
+  std::vector<Index> unknown(static_cast<std::size_t>(free.size()), -1);
+  for (Eigen::Index d = 0; d < free.size(); ++d)
+    if (free[d]) {
+      unknown[static_cast<std::size_t>(d)] = static_cast<Index>(dof.size());
+      dof.push_back(static_cast<Index>(d));
+    }
+  return unknown;
+}
+
+/// Call use(row unknown, column unknown, position) for every entry between free dofs, row by row.
+template <class Use>
+void for_free_entries(const BlockPattern& pattern, const Reduction& reduction, Use use) {
+  for (Index row = 0; row < reduction.free(); ++row) {
+    const auto dof = static_cast<std::size_t>(reduction.dof[static_cast<std::size_t>(row)]);
+    for (Index k = pattern.row_start[dof]; k < pattern.row_start[dof + 1]; ++k) {
+      const Index column = pattern.column[static_cast<std::size_t>(k)];
+      const Index unknown = reduction.unknown[static_cast<std::size_t>(column)];
+      if (unknown >= 0) use(row, unknown, k);
+    }
+  }
+}
+
+/// Column c of the lower triangle is row c of the upper one, in the same order.
+void fill_lower(const BlockPattern& pattern, Reduction& reduction) {
+  CscPattern& csc = reduction.pattern;
+  for_free_entries(pattern, reduction, [&](Index row, Index column, Index position) {
+    if (column < row) return;
+    csc.row.push_back(column);
+    reduction.source.push_back(position);
+    csc.start[static_cast<std::size_t>(row) + 1] = csc.nonzeros();
+  });
+}
+
+void fill_full(const BlockPattern& pattern, Reduction& reduction) {
+  CscPattern& csc = reduction.pattern;
+  for_free_entries(pattern, reduction, [&](Index, Index column, Index) {
+    ++csc.start[static_cast<std::size_t>(column) + 1];
+  });
+  for (std::size_t c = 1; c < csc.start.size(); ++c)
+    csc.start[c] += csc.start[c - 1];
+  csc.row.resize(static_cast<std::size_t>(csc.start.back()));
+  reduction.source.resize(csc.row.size());
+  std::vector<std::int64_t> next(csc.start.begin(), csc.start.end() - 1);
+  for_free_entries(pattern, reduction, [&](Index row, Index column, Index position) {
+    const auto k = static_cast<std::size_t>(next[static_cast<std::size_t>(column)]++);
+    csc.row[k] = row;
+    reduction.source[k] = position;
+  });
+}
+
+} // namespace
+
+Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage) {
+  require_size("free", free.size(), pattern.dofs(), "give one entry for each dof, three a node");
+  Reduction reduction;
+  reduction.unknown = number_free(free, reduction.dof);
+  CscPattern& csc = reduction.pattern;
+  csc.size = reduction.free();
+  csc.lower = storage == Storage::Lower;
+  csc.start.assign(static_cast<std::size_t>(csc.size) + 1, 0);
+  for (Index dof : reduction.dof)
+    csc.group.push_back(dof / 3);
+  csc.lower ? fill_lower(pattern, reduction) : fill_full(pattern, reduction);
+  return reduction;
+}
+
+void Reduction::gather(const ConstVector& values, MutableVector reduced) const {
+  require_size("reduced", reduced.size(), pattern.nonzeros(), "size it as pattern.nonzeros()");
+  for (std::size_t k = 0; k < source.size(); ++k)
+    reduced[static_cast<Eigen::Index>(k)] = values[source[k]];
+}
+
+Vector Reduction::restrict(const ConstVector& full) const {
+  require_size("full", full.size(), static_cast<long long>(unknown.size()),
+               "give three entries a node");
+  Vector reduced(free());
+  for (Index k = 0; k < free(); ++k)
+    reduced[k] = full[dof[static_cast<std::size_t>(k)]];
+  return reduced;
+}
+
+void Reduction::add_to(const ConstVector& reduced, double scale, MutableVector full) const {
+  require_size("reduced", reduced.size(), free(), "give one entry for each free dof");
+  require_size("full", full.size(), static_cast<long long>(unknown.size()),
+               "give three entries a node");
+  for (Index k = 0; k < free(); ++k)
+    full[dof[static_cast<std::size_t>(k)]] += scale * reduced[k];
+}
+
+} // namespace supple

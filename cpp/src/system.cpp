@@ -1,0 +1,167 @@
+#include "supple/system.hpp"
+
+#include <chrono>
+
+#include "supple/error.hpp"
+
+namespace supple {
+
+namespace {
+
+/// Adds the seconds of its own life to a counter.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& total) : total_(total) {}
+  ~Stopwatch() {
+    total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& total_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+double factor_of(const Term& term, double load_factor) { return term.is_load ? load_factor : 1.0; }
+
+}  // namespace
+
+void System::add(std::shared_ptr<Term> term) {
+  terms_.push_back(std::move(term));
+  pattern_.reset();
+  reduction_.reset();
+  factor_.reset();
+}
+
+void System::set_free(Mask free) {
+  require_size("free", free.size(), dofs(), "one entry for each dof");
+  if (free_.size() == free.size() && (free_ == free).all()) return;
+  free_ = std::move(free);
+  reduction_.reset();
+  factor_.reset();
+}
+
+bool System::has_energy() const {
+  for (const auto& term : terms_) {
+    if (!term->has_energy()) return false;
+  }
+  return true;
+}
+
+Kind System::kind() const {
+  for (const auto& term : terms_) {
+    if (!term->symmetric()) return Kind::Unsymmetric;
+  }
+  return Kind::Cholesky;
+}
+
+double System::energy(const ConstVector& u, double load_factor) const {
+  double total = 0.0;
+  for (const auto& term : terms_) total += factor_of(*term, load_factor) * term->energy(u);
+  return total;
+}
+
+Vector System::residual(const ConstVector& u, double load_factor) const {
+  Vector r = Vector::Zero(dofs());
+  for (const auto& term : terms_) term->residual(u, factor_of(*term, load_factor), r);
+  return r;
+}
+
+Vector System::external(const ConstVector& u) const {
+  Vector r = Vector::Zero(dofs());
+  for (const auto& term : terms_) {
+    if (term->is_load) term->residual(u, -1.0, r);
+  }
+  return r;
+}
+
+VolumeRatio System::volume_ratio(const ConstVector& u) const {
+  VolumeRatio smallest;
+  for (const auto& term : terms_) {
+    const VolumeRatio ratio = term->volume_ratio(u);
+    if (ratio.value < smallest.value) smallest = ratio;
+  }
+  return smallest;
+}
+
+const BlockPattern& System::pattern() {
+  if (!pattern_) {
+    std::vector<Connectivity> cells;
+    cells.reserve(terms_.size());
+    for (const auto& term : terms_) cells.push_back(term->cells());
+    pattern_ = std::make_unique<BlockPattern>(block_pattern(dofs() / 3, cells));
+  }
+  return *pattern_;
+}
+
+const Vector& System::assemble_tangent(const ConstVector& u, double load_factor) {
+  const BlockPattern& p = pattern();
+  const Stopwatch watch(timings.assembly);
+  values_.setZero(p.nonzeros());
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    const double scale = factor_of(*terms_[t], load_factor);
+    if (scale != 0.0) terms_[t]->tangent(u, scale, p.scatter[t], values_);
+  }
+  return values_;
+}
+
+const Reduction& System::reduction() {
+  if (!reduction_) {
+    if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
+    reduction_ = std::make_unique<Reduction>(reduce(pattern(), free_, storage(kind())));
+  }
+  return *reduction_;
+}
+
+FactorStatus System::factorise(double shift) {
+  const Reduction& r = reduction();
+  const Stopwatch watch(timings.factor);
+  if (!factor_) {
+    factor_ = std::make_unique<Factor>(kind());
+    factor_->analyse(r.pattern);
+  }
+  reduced_.resize(r.pattern.nonzeros());
+  r.gather(values_, reduced_);
+  if (shift > 0.0) {
+    // The lower triangle's columns begin with their diagonal entry.
+    double mean = 0.0;
+    for (std::int64_t j = 0; j < r.pattern.size; ++j) {
+      mean += std::abs(reduced_[r.pattern.start[static_cast<std::size_t>(j)]]);
+    }
+    mean /= static_cast<double>(r.pattern.size);
+    for (std::int64_t j = 0; j < r.pattern.size; ++j) {
+      reduced_[r.pattern.start[static_cast<std::size_t>(j)]] += shift * mean;
+    }
+  }
+  return factor_->factorise(reduced_);
+}
+
+Vector System::solve(const ConstVector& rhs) {
+  const Reduction& r = reduction();
+  const Stopwatch watch(timings.solve);
+  Vector x(r.free());
+  Refinement refinement;
+  refinement.tolerance = 1e-12;
+  factor_->solve(r.restrict(rhs), x, refinement);
+  Vector full = Vector::Zero(dofs());
+  r.add_to(x, 1.0, full);
+  return full;
+}
+
+Vector System::apply(const ConstVector& x) {
+  Vector y = Vector::Zero(dofs());
+  multiply(pattern(), values_, x, y);
+  return y;
+}
+
+Inertia System::inertia() {
+  const Reduction& r = reduction();
+  Factor factor(Kind::QuasiDefinite);
+  factor.analyse(r.pattern);
+  r.gather(values_, reduced_);
+  if (!factor.factorise(reduced_).ok()) return {0, 1, 0, 0.0};
+  return factor.inertia();
+}
+
+}  // namespace supple

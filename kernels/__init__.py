@@ -1,0 +1,14 @@
+"""The kernel generator: a strain energy in, C kernels out (UFL, FFCx, Basix).
+
+    tensors     operations on UFL expressions and on numbers alike
+    energy      the words that an energy file may use
+    kinematics  what `k` offers: F, C, invariants, stretch tensor
+    reader      an energy file, read with ast and checked before it runs
+    elements    Basix elements and the pinned quadrature
+    forms/      weak forms: volume, loads, membrane
+    unit        the name of one kernel library, such as neo_hookean.P1.direct
+    generate    unit → C source with its kernel table
+    build       C source → shared library, kept in the user's cache
+
+Only `reader`, `unit`, `cells` and `build` are needed to find a library that exists: they import neither UFL nor FFCx.
+"""

@@ -1,0 +1,101 @@
+"""What every energy must be, tried on numbers before it is compiled: scalar, objective, stress free.
+
+The numbers come from the energy file run on numeric tensors, so nothing of UFL is involved.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .kinematics import Kinematics
+from .reader import EnergyFileError, Law
+from .tensors import Tensor
+
+_EDGES = np.array([[1.0, 0.2, 0.1], [0.1, 0.9, 0.3], [0.0, 0.2, 1.1]])
+
+
+def energy_at(law: Law, F: np.ndarray, values: dict[str, Any], edges: Any = _EDGES) -> float:
+    """ψ, Pa, of the deformation gradient ``F`` (3, 3) and parameters name → value."""
+    tensors = {n: np.asarray(v).view(Tensor) if np.ndim(v) else v for n, v in values.items()}
+    k = Kinematics(np.asarray(F, float).view(Tensor), np.asarray(edges).view(Tensor))
+    psi = law.psi(k, tensors)
+    if np.ndim(psi) != 0:
+        raise EnergyFileError(
+            f"{law.path}: the energy is not a scalar but has shape {np.shape(psi)}; "
+            "contract it, for example with tr() or inner()."
+        )
+    return float(psi)
+
+
+def stress_at(law: Law, F: np.ndarray, values: dict[str, Any], step: float = 1e-5) -> np.ndarray:
+    """P (3, 3), Pa, by central differences of ψ."""
+    stress = np.zeros((3, 3))
+    for i, j in np.ndindex(3, 3):
+        d = np.zeros((3, 3))
+        d[i, j] = step
+        difference = energy_at(law, F + d, values) - energy_at(law, F - d, values)
+        stress[i, j] = difference / (2 * step)
+    return stress
+
+
+def stiffness_scale(law: Law, values: dict[str, Any]) -> float:
+    """Largest second difference of ψ at F = I, Pa: the scale against which stress counts as zero."""
+    step, eye = 1e-3, np.eye(3)
+    zero = energy_at(law, eye, values)
+    second = 0.0
+    for i, j in np.ndindex(3, 3):
+        d = np.zeros((3, 3))
+        d[i, j] = step
+        psi = energy_at(law, eye + d, values) + energy_at(law, eye - d, values) - 2 * zero
+        second = max(second, abs(psi) / step**2)
+    return second
+
+
+def random_rotation(rng: np.random.Generator) -> np.ndarray:
+    """A rotation (3, 3), uniformly distributed."""
+    q, r = np.linalg.qr(rng.standard_normal((3, 3)))
+    q = q * np.sign(np.diag(r))
+    return np.asarray(q if np.linalg.det(q) > 0 else -q)
+
+
+def require_sound(law: Law) -> None:
+    """Refuse an energy that is not scalar, finite, zero and stress free at rest, and objective.
+
+    Raises:
+        EnergyFileError: one sentence with the figure found; declared exceptions are let pass.
+    """
+    values = {p.name: p.default for p in law.parameters}
+    scale = stiffness_scale(law, values)
+    if not np.isfinite(scale) or scale == 0.0:
+        raise EnergyFileError(f"{law.path}: the energy has no finite stiffness at F = I; check it.")
+    if "stress_free" not in law.exceptions:
+        _require_stress_free(law, values, scale)
+    if "objective" not in law.exceptions:
+        _require_objective(law, values, scale)
+
+
+def _require_stress_free(law: Law, values: dict[str, Any], scale: float) -> None:
+    declare = 'subtract its value at F = I, or declare exceptions = {"stress_free"}.'
+    psi = energy_at(law, np.eye(3), values)
+    if abs(psi) > 1e-10 * scale:
+        raise EnergyFileError(f"{law.path}: psi at F = I is {psi:.6g} Pa, not 0; {declare}")
+    stress = np.abs(stress_at(law, np.eye(3), values)).max()
+    if stress > 1e-6 * scale:
+        raise EnergyFileError(f"{law.path}: the stress at F = I is {stress:.6g} Pa, not 0; {declare}")
+
+
+def _require_objective(law: Law, values: dict[str, Any], scale: float) -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(8):
+        F = np.eye(3) + 0.2 * rng.standard_normal((3, 3))
+        if np.linalg.det(F) < 0.3:
+            continue
+        psi, turned = (energy_at(law, Q @ F, values) for Q in (np.eye(3), random_rotation(rng)))
+        if abs(psi - turned) > 1e-9 * max(scale, abs(psi)):
+            raise EnergyFileError(
+                f"{law.path}: is not objective: a rotation changes psi from {psi:.6g} to "
+                f"{turned:.6g} Pa; write it in C, its invariants or E, or declare "
+                'exceptions = {"objective"}.'
+            )

@@ -1,0 +1,89 @@
+"""Basix elements of DESIGN §5 and the pinned quadrature of §4, as UFL meshes to write forms on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import basix
+import basix.ufl
+import numpy as np
+import ufl
+
+#: name → (Basix cell, degree, gdim is 3 for all). T and S are the facets of P and Q elements.
+CELLS = {
+    "P1": ("tetrahedron", 1), "P2": ("tetrahedron", 2), "Q1": ("hexahedron", 1), "Q2": ("hexahedron", 2),
+    "T1": ("triangle", 1), "T2": ("triangle", 2), "S1": ("quadrilateral", 1), "S2": ("quadrilateral", 2),
+}  # fmt: skip
+#: Degree of the stiffness' quadrature (points: 1, 4, 8, 27 and 1, 3, 4, 9).
+STIFFNESS_DEGREE = {"P1": 1, "P2": 2, "Q1": 2, "Q2": 4, "T1": 1, "T2": 2, "S1": 2, "S2": 4}
+#: Degree of the loads' quadrature: at least twice the element's degree.
+LOAD_DEGREE = {"P1": 2, "P2": 4, "Q1": 2, "Q2": 4, "T1": 2, "T2": 4, "S1": 2, "S2": 4}
+
+
+@dataclass(frozen=True)
+class Space:
+    """An element with its isoparametric mesh and the arguments of its forms."""
+
+    name: str
+    mesh: Any
+    displacement: Any
+    test: Any
+    trial: Any
+
+    def field(self, size: int) -> Any:
+        """A new per-cell coefficient: a scalar, or a vector of ``size`` entries."""
+        shape = () if size == 1 else (size,)
+        cell = self.mesh.ufl_cell().cellname
+        element = basix.ufl.element("DG", cell, 0, shape=shape)
+        return ufl.Coefficient(ufl.FunctionSpace(self.mesh, element))
+
+
+@cache
+def scalar_element(name: str) -> Any:
+    """The scalar Basix element of a name in CELLS; nodal in every case."""
+    cell, degree = CELLS[name]
+    if name in ("Q2", "S2"):
+        return _nodal_serendipity(cell)
+    return basix.ufl.element("P", cell, degree)
+
+
+def space(name: str) -> Space:
+    """Vector displacement on the isoparametric element ``name``, embedded in 3-D."""
+    element = basix.ufl.blocked_element(scalar_element(name), shape=(3,))
+    mesh = ufl.Mesh(element)
+    V = ufl.FunctionSpace(mesh, element)
+    return Space(name, mesh, ufl.Coefficient(V), ufl.TestFunction(V), ufl.TrialFunction(V))
+
+
+def quadrature(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (q, tdim) and weights (q,) of the default rule, on the reference cell."""
+    cell = basix.CellType[CELLS[name][0]]
+    points, weights = basix.make_quadrature(cell, degree)
+    return points, weights
+
+
+def _nodal_serendipity(cell: str) -> Any:
+    """The quadratic serendipity space with point values at vertices and edge midpoints.
+
+    Basix' own serendipity element has edge moments for degrees of freedom: only its span is used.
+    """
+    kind = basix.CellType[cell]
+    own = basix.create_element(
+        basix.ElementFamily.serendipity, kind, 2,
+        lagrange_variant=basix.LagrangeVariant.legendre, dpc_variant=basix.DPCVariant.legendre,
+    )  # fmt: skip
+    geometry, topology = basix.geometry(kind), basix.topology(kind)
+    tdim = geometry.shape[1]
+    x: list[list[np.ndarray]] = [[] for _ in range(4)]
+    M: list[list[np.ndarray]] = [[] for _ in range(4)]
+    for d in range(tdim + 1):
+        for vertices in topology[d]:
+            points = geometry[vertices].mean(axis=0, keepdims=True) if d < 2 else np.zeros((0, tdim))
+            x[d].append(points)
+            M[d].append(np.ones((1, 1, 1, 1)) if d < 2 else np.zeros((0, 1, 0, 1)))
+    return basix.ufl.custom_element(
+        kind, (), own.wcoeffs, x, M, 0, basix.MapType.identity, basix.SobolevSpace.H1, False,
+        1, 2, basix.PolysetType.standard,
+    )  # fmt: skip

@@ -1,0 +1,140 @@
+"""The words of an energy file: kinematics, typed parameters, operations, volumetric terms.
+
+An energy file imports from here (as ``supple.energy``) and from nowhere else; DESIGN §3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .kinematics import Kinematics
+from .tensors import (
+    cos,
+    det,
+    dot,
+    exp,
+    identity,
+    inner,
+    ln,
+    positive,
+    sin,
+    sqrt,
+    sym,
+    tanh,
+    tr,
+    transpose,
+)
+
+__all__ = [  # what an energy file may import
+    "Direction",
+    "Kinematics",
+    "Metre",
+    "Number",
+    "Pa",
+    "Ratio",
+    "Volumetric",
+    "cos",
+    "det",
+    "dot",
+    "exp",
+    "identity",
+    "inner",
+    "lame",
+    "ln",
+    "log_volumetric",
+    "ogden_volumetric",
+    "positive",
+    "quadratic_volumetric",
+    "sin",
+    "sqrt",
+    "sym",
+    "tanh",
+    "tr",
+    "transpose",
+]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Type of a parameter: its unit and its open or closed bounds.
+
+    Called, it gives the same type with other bounds: ``c2: Pa(minimum=0.0) = 1e3``.
+    """
+
+    name: str
+    unit: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    open: bool = True  # the bounds themselves are outside
+    size: int = 1
+
+    def __call__(self, minimum: float | None = None, maximum: float | None = None) -> Kind:
+        low = self.minimum if minimum is None else float(minimum)
+        high = self.maximum if maximum is None else float(maximum)
+        return replace(self, minimum=low, maximum=high, open=False)
+
+    def admits(self, value: Any) -> bool:
+        """True where every entry of ``value`` is finite and inside the bounds."""
+        v = np.asarray(value, dtype=float)
+        if self.open:
+            inside = (v > self.minimum) & (v < self.maximum)
+        else:
+            inside = (v >= self.minimum) & (v <= self.maximum)
+        return bool(np.all(np.isfinite(v) & inside))
+
+    def range(self) -> str:
+        """The bounds in words, for messages."""
+        left, right = ("(", ")") if self.open else ("[", "]")
+        return f"{left}{self.minimum:g}, {self.maximum:g}{right}"
+
+
+Pa = Kind("Pa", "Pa", minimum=0.0)
+Ratio = Kind("Ratio", "1", minimum=-1.0, maximum=0.5)
+Number = Kind("Number", "1")
+Metre = Kind("Metre", "m", minimum=0.0)
+Direction = Kind("Direction", "1", size=3)
+
+
+def lame(young: Any, poisson: Any) -> tuple[Any, Any]:
+    """Lamé's (mu, lambda), Pa, from Young's modulus, Pa, and Poisson's ratio."""
+    mu = young / (2 * (1 + poisson))
+    return mu, young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+
+
+@dataclass(frozen=True)
+class Volumetric:
+    """A volumetric energy U(J) with the pair of its mixed form psi_dev + p g(J) - U*(p).
+
+    Attributes:
+        U: energy, Pa.
+        g: constraint g(J), 1: the multiplier p gives the stress p g'(J).
+        conjugate: U*(p), Pa, of ``p`` in Pa.
+    """
+
+    U: Any
+    g: Any
+    conjugate: Any
+
+
+def log_volumetric(J: Any, bulk: Any) -> Volumetric:  # noqa: N803
+    """bulk/2 ln(J)²."""
+    return Volumetric(bulk / 2 * ln(J) ** 2, ln(J), lambda p: p**2 / (2 * bulk))
+
+
+def quadratic_volumetric(J: Any, bulk: Any) -> Volumetric:  # noqa: N803
+    """bulk/2 (J - 1)²."""
+    return Volumetric(bulk / 2 * (J - 1) ** 2, J - 1, lambda p: p**2 / (2 * bulk))
+
+
+def ogden_volumetric(J: Any, bulk: Any) -> Volumetric:  # noqa: N803
+    """bulk/4 (J² - 1 - 2 ln J); Mazier 2022, eq. 70."""
+
+    # With s = ln J: U*(p) = max over s of p s - U(e^s), reached where e^(2s) = 1 + 2 p / bulk.
+    def conjugate(p: Any) -> Any:
+        return (p / 2 + bulk / 4) * ln(1 + 2 * p / bulk) - p / 2
+
+    return Volumetric(bulk / 4 * (J**2 - 1 - 2 * ln(J)), ln(J), conjugate)

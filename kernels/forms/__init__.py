@@ -1,0 +1,1 @@
+"""Weak forms: each module gives, for one kind of term, its kernels as UFL objects by name."""

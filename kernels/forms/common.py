@@ -1,0 +1,48 @@
+"""What the forms share: a kernel as a UFL object, its fields, the measure with pinned quadrature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import ufl
+
+from ..elements import Space, quadrature
+
+
+@dataclass(frozen=True)
+class Forms:
+    """The kernels of one term.
+
+    Attributes:
+        space: element that they live on.
+        fields: coefficient name → UFL coefficient; "u" (node values) and per-cell fields.
+        kernels: kernel name → UFL form, or for point values (expression, points).
+        degree: of the quadrature.
+    """
+
+    space: Space
+    fields: dict[str, Any]
+    kernels: dict[str, Any]
+    degree: int
+
+
+def measure(space: Space, degree: int) -> Any:
+    """dx on the term's own mesh with the pinned rule."""
+    return ufl.Measure(
+        "dx",
+        domain=space.mesh,
+        metadata={"quadrature_degree": degree, "quadrature_rule": "default"},
+    )
+
+
+def at_points(space: Space, degree: int, *values: Any) -> tuple[Any, Any]:
+    """Point values: all entries of ``values``, row-major, one after another, at each point."""
+    entries: list[Any] = []
+    for value in values:
+        rows = value.ufl_shape
+        if rows == ():
+            entries.append(value)
+        else:
+            entries += [value[i, j] for i in range(rows[0]) for j in range(rows[1])]
+    return ufl.as_vector(entries), quadrature(space.name, degree)[0]

@@ -1,0 +1,106 @@
+"""Operations that an energy may use, on UFL expressions (kernels) and on numbers (checks) alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+class Tensor(np.ndarray):
+    """A numeric 3 x 3 tensor whose ``*`` multiplies as UFL's does."""
+
+    def __mul__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray) and other.ndim >= 1 and self.ndim == 2:
+            return np.matmul(self, other)
+        return np.ndarray.__mul__(self, other)
+
+    @property
+    def T(self) -> Tensor:  # noqa: N802 (UFL's name)
+        return self.transpose().view(Tensor)
+
+
+def is_symbolic(x: Any) -> bool:
+    """True for a UFL expression, without importing UFL for numbers."""
+    return hasattr(x, "_ufl_is_terminal_")
+
+
+def _unary(name: str, number: Any) -> Any:
+    def function(x: Any) -> Any:
+        if is_symbolic(x):
+            import ufl
+
+            return getattr(ufl, name)(x)
+        return number(x)
+
+    function.__name__ = name
+    function.__doc__ = f"{name} of a scalar."
+    return function
+
+
+ln = _unary("ln", np.log)
+exp = _unary("exp", np.exp)
+sqrt = _unary("sqrt", np.sqrt)
+sin = _unary("sin", np.sin)
+cos = _unary("cos", np.cos)
+tanh = _unary("tanh", np.tanh)
+
+
+def tr(a: Any) -> Any:
+    """Trace."""
+    if is_symbolic(a):
+        import ufl
+
+        return ufl.tr(a)
+    return float(np.trace(a))
+
+
+def det(a: Any) -> Any:
+    """Determinant."""
+    if is_symbolic(a):
+        import ufl
+
+        return ufl.det(a)
+    return float(np.linalg.det(a))
+
+
+def inner(a: Any, b: Any) -> Any:
+    """Double contraction a:b of tensors, dot product of vectors."""
+    if is_symbolic(a) or is_symbolic(b):
+        import ufl
+
+        return ufl.inner(a, b)
+    return float(np.sum(np.asarray(a) * np.asarray(b)))
+
+
+def dot(a: Any, b: Any) -> Any:
+    """Contraction over one index."""
+    if is_symbolic(a) or is_symbolic(b):
+        import ufl
+
+        return ufl.dot(a, b)
+    return np.dot(a, b)
+
+
+def transpose(a: Any) -> Any:
+    """Transpose."""
+    return a.T
+
+
+def sym(a: Any) -> Any:
+    """Symmetric part."""
+    return 0.5 * (a + a.T)
+
+
+def positive(x: Any) -> Any:
+    """max(x, 0): the part of a fibre's strain that is tension."""
+    if is_symbolic(x):
+        import ufl
+
+        return ufl.conditional(ufl.gt(x, 0.0), x, 0.0)
+    return max(float(x), 0.0)
+
+
+def identity() -> Any:
+    """The unit tensor (3, 3)."""
+    return np.eye(3).view(Tensor)

@@ -1,0 +1,59 @@
+"""Supple: strain energies in one line, fast finite elements, and where a tumour lies supine.
+
+Names are loaded at first use, so ``import supple`` is quick and works before anything is compiled.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from .errors import ConvergenceError, InputError, MaterialError, MeshError, SuppleError
+
+if TYPE_CHECKING:
+    from .body import Body as Body
+    from .body import assemble as assemble
+    from .laws import Material as Material
+    from .laws import material as material
+    from .laws import materials as materials
+    from .mesh import Mesh as Mesh
+    from .mesh import Tag as Tag
+    from .state import Rest as Rest
+    from .state import State as State
+    from .surface import Surface as Surface
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Body": "body",
+    "Material": "laws",
+    "Mesh": "mesh",
+    "Rest": "state",
+    "State": "state",
+    "Surface": "surface",
+    "Tag": "mesh",
+    "assemble": "body",
+    "material": "laws",
+    "materials": "laws",
+}
+
+__all__ = [
+    "ConvergenceError",
+    "InputError",
+    "MaterialError",
+    "MeshError",
+    "SuppleError",
+    *_HOME,
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'supple' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,397 @@
+"""A body: a mesh with laws, supports and loads; solved forward, or back to its rest shape."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import newton, parameters, supports, terms
+from .errors import InputError
+from .laws import read_law
+from .mesh_tags import Where
+from .newton import Progress, Settings
+from .state import Rest, State, outcome
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from .mesh import Mesh
+    from .surface import Surface
+
+Floats = npt.NDArray[np.float64]
+
+#: Formulations of the volume terms.
+FORMULATIONS = ("displacement",)
+METHODS = ("inverse", "reversed-gravity")
+
+
+class Body:
+    """A mesh with a law on its cells.
+
+    Args:
+        mesh: points in m.
+        material: name of a shipped energy, or path of an energy file.
+        formulation: "displacement".
+        density: kg/m³, of the rest state; one number or one a cell.
+        quadrature: degree of the stiffness' rule; None for the element's own (DESIGN §4).
+        **values: the law's parameters in SI, each one number or one a cell.
+
+    Raises:
+        MaterialError: unknown law or parameter, value out of bounds, wrong energy file.
+        InputError: a wrong shape or formulation, a negative density.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        material: str | Path,
+        formulation: str = "displacement",
+        density: npt.ArrayLike = 0.0,
+        quadrature: int | None = None,
+        **values: Any,
+    ) -> None:
+        if formulation not in FORMULATIONS:
+            raise InputError(f"formulation must be one of {FORMULATIONS}, got {formulation!r}.")
+        if quadrature is not None and not 1 <= quadrature <= 20:
+            raise InputError(f"quadrature must be a degree from 1 to 20, got {quadrature}.")
+        law, count = read_law(material), len(mesh.cells)
+        region = terms.Region(law, np.arange(count), parameters.defaults(law, count))
+        region.values |= parameters.given(law, values, count)
+        rho = parameters.per_cell("density", density, count)
+        if not (np.isfinite(rho).all() and (rho >= 0).all()):
+            raise InputError(f"density must be at least 0 kg/m³, got {rho.min():g}.")
+        n = len(mesh.points)
+        self._description = terms.Description(
+            mesh, [region], rho, np.zeros(3), np.zeros((n, 3)), quadrature
+        )
+        self._fixed = np.zeros((n, 3), dtype=bool)
+        self._prescribed = np.zeros((n, 3))
+        self._built: dict[tuple[bool, str], terms.Built] = {}
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh, m."""
+        return self._description.mesh
+
+    # Laws and parameters
+
+    def region(self, cells: Where, material: str | Path, **values: Any) -> Body:
+        """Another law on some cells: a mask, ids or a tag. Values as in the constructor."""
+        d, law = self._description, read_law(material)
+        ids = self.mesh.cell_ids(cells)
+        new = terms.Region(law, ids, parameters.defaults(law, len(ids)))
+        new.values |= parameters.given(law, values, len(ids))
+        for old in d.regions:
+            keep = ~np.isin(old.ids, ids)
+            old.ids = old.ids[keep]
+            old.values = {name: value[keep] for name, value in old.values.items()}
+        d.regions.append(new)
+        return self._restructured()
+
+    def set(self, where: Where | None = None, **values: Any) -> Body:
+        """New parameters, scalars or one a chosen cell (all cells if ``where`` is None)."""
+        chosen = np.arange(len(self.mesh.cells)) if where is None else self.mesh.cell_ids(where)
+        touched = [r for r in self._description.regions if np.isin(r.ids, chosen).any()]
+        for region in touched:
+            inside = np.isin(region.ids, chosen)
+            rows = np.searchsorted(chosen, region.ids[inside])
+            mine = {n: v if np.ndim(v) == 0 else np.asarray(v)[rows] for n, v in values.items()}
+            new = parameters.given(region.law, mine, int(inside.sum()))
+            for name, value in new.items():
+                changed = region.values[name].copy()
+                changed[inside] = value
+                region.values[name] = changed
+        return self
+
+    def skin(
+        self, where: Where, material: str | Path, thickness: npt.ArrayLike, **values: Any
+    ) -> Body:
+        """A membrane on the boundary facets of ``where`` that carries tension only.
+
+        Args:
+            thickness: m at rest, one number or one a facet.
+            **values: the law's parameters; poisson is 0.5 unless given, a skin keeps its volume.
+        """
+        facets, law = self.mesh.boundary(where), read_law(material)
+        skin = terms.Region(law, facets, parameters.defaults(law, len(facets), skin=True))
+        skin.values |= parameters.given(law, values, len(facets), skin=True)
+        skin.values["thickness"] = parameters.per_cell("thickness", thickness, len(facets))
+        if not (skin.values["thickness"] > 0).all():
+            raise InputError(f"thickness must be above 0 m, got {np.min(thickness):g}.")
+        self._description.skins.append(skin)
+        return self._restructured()
+
+    def set_skin(self, number: int = 0, **values: Any) -> Body:
+        """New parameters of the skin that was added as the ``number``-th."""
+        skins = self._description.skins
+        if not 0 <= number < len(skins):
+            raise InputError(f"number must name one of {len(skins)} skins, got {number}.")
+        skin = skins[number]
+        skin.values |= parameters.given(skin.law, values, len(skin.ids), skin=True)
+        return self
+
+    # Supports
+
+    def fix(self, where: Where) -> Body:
+        """Hold the nodes of ``where`` in place."""
+        return self.prescribe(where, (0.0, 0.0, 0.0))
+
+    def prescribe(self, where: Where, u: npt.ArrayLike) -> Body:
+        """Give the nodes of ``where`` the displacement ``u``, m: (3,) or one a node; NaN is free."""
+        nodes, value = self.mesh.nodes(where), np.asarray(u, dtype=float)
+        if value.shape not in ((3,), (len(nodes), 3)):
+            raise InputError(f"u must have shape (3,) or ({len(nodes)}, 3), got {value.shape}.")
+        value = np.broadcast_to(value, (len(nodes), 3))
+        self._fixed[nodes] = ~np.isnan(value)
+        self._prescribed[nodes] = np.nan_to_num(value)
+        return self
+
+    def slide(
+        self, where: Where, surface: Surface, compliance: float = 1e-8, per_node: bool = False
+    ) -> Body:
+        """Hold the nodes of ``where`` to a rigid surface, free to slide on it.
+
+        Args:
+            compliance: m/N of the whole region, shared by tributary area; of each node if
+                ``per_node`` (Mazier 2022 uses 1e-8 m/N).
+        """
+        if not compliance > 0:
+            raise InputError(f"compliance must be above 0 m/N, got {compliance}.")
+        nodes = self.mesh.nodes(where)
+        share = np.ones(len(nodes)) if per_node else supports.node_shares(self.mesh, nodes)
+        self._description.slides.append(terms.Slide(nodes, surface, share / compliance))
+        return self._restructured()
+
+    # Loads
+
+    def force(self, where: Where, force: npt.ArrayLike) -> Body:
+        """Add ``force`` (3,) N on each node of ``where``."""
+        forces = self._description.forces.copy()
+        forces[self.mesh.nodes(where)] += _vector("force", force)
+        self._description.forces = forces
+        return self
+
+    def traction(self, where: Where, traction: npt.ArrayLike, per: str = "rest") -> Body:
+        """Add a dead traction (3,) Pa on the facets of ``where``, per area at "rest" or "loaded"."""
+        if per not in ("rest", "loaded"):
+            raise InputError(f'per must be "rest" or "loaded", got {per!r}.')
+        load = terms.FacetLoad(self.mesh.boundary(where), _vector("traction", traction), per)
+        self._description.tractions.append(load)
+        return self._restructured()
+
+    def pressure(self, where: Where, pressure: float) -> Body:
+        """Add a pressure, Pa, that follows the facets of ``where`` and pushes inwards."""
+        if not np.isfinite(pressure):
+            raise InputError(f"pressure must be a number in Pa, got {pressure}.")
+        load = terms.FacetLoad(self.mesh.boundary(where), np.array([float(pressure)]))
+        self._description.pressures.append(load)
+        return self._restructured()
+
+    def gravity(self, g: npt.ArrayLike) -> Body:
+        """Set the acceleration of gravity (3,), m/s²."""
+        self._description.gravity = _vector("gravity", g)
+        return self
+
+    def clear_loads(self) -> Body:
+        """Remove gravity, forces, tractions and pressures."""
+        d = self._description
+        d.gravity, d.forces = np.zeros(3), np.zeros_like(d.forces)
+        d.tractions.clear()
+        d.pressures.clear()
+        return self._restructured()
+
+    # Solving
+
+    def solve(
+        self,
+        start: State | None = None,
+        load_steps: int | None = None,
+        rtol: float = 1e-10,
+        atol: float | None = None,
+        max_iterations: int = 25,
+        solver: str = "auto",
+        progress: Progress | None = None,
+    ) -> State:
+        """Equilibrium under the loads.
+
+        Args:
+            start: a state of this mesh to start from; from zero if None.
+            load_steps: equal steps; adaptive with cut-back if None.
+            rtol: of max(‖external force‖, ‖reactions‖); the last step is ≤ 1e-8 of the size too.
+            atol: N; rounding of the stiffness if None.
+            max_iterations: of each load step.
+            solver: "auto" or "direct" (sparse factorisation).
+            progress: called with a dict after each iteration; may raise to stop.
+
+        Raises:
+            InputError: nothing resists a rigid motion, or a wrong argument.
+            ConvergenceError: cause, history, worst cells, load factor; the body is as before.
+        """
+        if solver not in ("auto", "direct"):
+            raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
+        settings = Settings(load_steps, rtol, atol, max_iterations, progress)
+        u0 = np.zeros_like(self._prescribed) if start is None else self._start(start)
+        result, built = self._run(settings, u0, warm=start is not None)
+        newton.require_converged(result, self.mesh)
+        solved = terms.snapshot(self._description)
+        return State(**outcome(result, built, self._fixed), _solved=solved, _form="direct")
+
+    def rest_shape(
+        self,
+        method: str = "inverse",
+        density_of: str = "rest",
+        load_steps: int | None = None,
+        rtol: float = 1e-10,
+        atol: float | None = None,
+        max_iterations: int = 25,
+        progress: Progress | None = None,
+    ) -> Rest:
+        """The shape without the loads, taking the mesh for the loaded shape.
+
+        Args:
+            method: "inverse" (exact, one solve) or "reversed-gravity" (approximate: the loads act
+                the other way on the loaded shape; Mazier 2022, chapter 5).
+            density_of: the state, "rest" or "loaded", that `density` counts in.
+            load_steps, rtol, atol, max_iterations, progress: as in `solve`.
+
+        Raises:
+            InputError: as in `solve`.
+            ConvergenceError: there is no such rest shape, or none was found, with the cause.
+        """
+        if method not in METHODS:
+            raise InputError(f"method must be one of {METHODS}, got {method!r}.")
+        if density_of not in ("rest", "loaded"):
+            raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
+        settings = Settings(load_steps, rtol, atol, max_iterations, progress)
+        if method == "inverse":
+            zero = np.zeros_like(self._prescribed)
+            result, built = self._run(settings, zero, inverse=True, density_of=density_of)
+        else:
+            result, built = self._reversed()._run(settings, np.zeros_like(self._prescribed))
+        newton.require_converged(result, self.mesh, inverse=True)
+        solved = terms.snapshot(self._description)
+        fields = outcome(result, built, self._fixed)
+        return Rest(**fields, _solved=solved, _form="inverse", method=method)
+
+    def on(self, mesh: Mesh) -> Body:
+        """The same laws, supports and loads on a moved copy of the mesh, such as ``rest.mesh``."""
+        if mesh.element != self.mesh.element or not np.array_equal(mesh.cells, self.mesh.cells):
+            raise InputError("mesh must have the cells of the body's own mesh; use mesh.moved().")
+        body = copy.copy(self)
+        snapshot = terms.snapshot(self._description)
+        body._description = replace(
+            snapshot,
+            mesh=mesh,
+            tractions=list(snapshot.tractions),
+            pressures=list(snapshot.pressures),
+            skins=[terms.Region(s.law, s.ids, dict(s.values)) for s in snapshot.skins],
+            slides=list(snapshot.slides),
+        )
+        body._fixed, body._prescribed = self._fixed.copy(), self._prescribed.copy()
+        body._built = {}
+        return body
+
+    # Inside
+
+    def _reversed(self) -> Body:
+        body = self.on(self.mesh)
+        d = body._description
+        d.gravity, d.forces = -d.gravity, -d.forces
+        d.tractions = [replace(t, value=-t.value) for t in d.tractions]
+        d.pressures = [replace(p, value=-p.value) for p in d.pressures]
+        body._prescribed = -body._prescribed
+        return body
+
+    def _run(
+        self,
+        settings: Settings,
+        start: Floats,
+        warm: bool = False,
+        inverse: bool = False,
+        density_of: str = "rest",
+    ) -> tuple[Any, terms.Built]:
+        native = settings.checked(self._stiffness(), self.mesh)
+        native.warm = warm
+        supports.require_held(self.mesh, self._fixed, self._normals())
+        built = self._system(inverse, density_of)
+        laws = {r.law.name: r.law for r in self._description.regions if len(r.ids)}
+        barriers = [law for law in laws.values() if "barrier" in law.exceptions]
+        native.refuse_inversion = inverse or len(barriers) < len(laws)
+        built.system.set_free(~self._fixed.ravel())
+        built.system.reset_timings()
+        target = -self._prescribed if inverse else self._prescribed
+        return newton.solve(built.system, start, target, native, settings), built
+
+    def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
+        key = (inverse, density_of if inverse else "rest")
+        if key not in self._built:
+            self._built[key] = terms.build(self._description, *key)
+        terms.refresh(self._built[key], self._description)
+        return self._built[key]
+
+    def _restructured(self) -> Body:
+        self._built.clear()
+        return self
+
+    def _stiffness(self) -> float:
+        """Largest modulus of the body, Pa: the scale of rounding in its internal forces."""
+        values = [
+            float(region.values[p.name].max())
+            for region in self._description.regions
+            for p in region.law.parameters
+            if p.kind.unit == "Pa" and len(region.ids)
+        ]
+        return max(values, default=1.0)
+
+    def _normals(self) -> dict[int, Floats]:
+        from .core import core
+
+        normals: dict[int, Floats] = {}
+        for slide in self._description.slides:
+            surface = slide.surface
+            tree = core().SurfaceTree(surface.points, surface.triangles.astype(np.int32))
+            landed = tree.closest(self.mesh.points[slide.nodes])
+            normals |= dict(zip(slide.nodes.tolist(), landed.normal, strict=True))
+        return normals
+
+    def _start(self, start: State) -> Floats:
+        if start.u.shape != self._prescribed.shape:
+            raise InputError(
+                f"start must be a state of this mesh with {len(self.mesh.points)} nodes, "
+                f"got one with {len(start.u)}."
+            )
+        return start.u
+
+
+def assemble(body: Body, u: npt.ArrayLike) -> tuple[float, Floats, csr_array]:
+    """Energy, residual and tangent of a body at ``u`` (n, 3) m, all dofs, before elimination.
+
+    Returns:
+        energy (J; NaN where a load has none), residual (n, 3) N, internal minus external, and
+        tangent (3n, 3n) N/m as csr; dofs are node-major: x, y, z of node 0 first.
+
+    Raises:
+        InputError: ``u`` has another shape.
+    """
+    from scipy.sparse import csr_array
+
+    flat = np.asarray(u, dtype=float)
+    if flat.shape != body.mesh.points.shape:
+        raise InputError(f"u must have shape {body.mesh.points.shape}, got {flat.shape}.")
+    flat = flat.ravel()
+    system = body._system().system
+    energy = system.energy(flat, 1.0) if system.has_energy() else float("nan")
+    tangent = csr_array(system.tangent(flat), shape=(flat.size, flat.size))
+    return energy, system.residual(flat, 1.0).reshape(-1, 3), tangent
+
+
+def _vector(name: str, value: npt.ArrayLike) -> Floats:
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(f"{name} must be three numbers, got {value!r}.")
+    return vector

@@ -1,0 +1,1 @@
+"""The prone-to-supine pipeline: the only part of Supple that knows anatomy."""

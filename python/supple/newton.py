@@ -1,0 +1,113 @@
+"""Runs the runtime's Newton solver for a body and says in words why it stopped, if it did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .core import core
+from .errors import ConvergenceError, InputError
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
+
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[dict[str, float]], None]
+
+_FIELDS = ("load_factor", "iteration", "residual", "tolerance", "step", "length", "shift")
+
+_CAUSES = {
+    "unstable": "unstable equilibrium: a small push leaves it (buckling)",
+    "inverted": "inverted cell: the load is too large for this material or mesh",
+    "singular": "singular stiffness: a part is not held or has no stiffness",
+    "limit_point": "load past a limit point: no stable equilibrium beyond it",
+    "stalled": "the residual does not fall any more",
+}
+_CAUSES_INVERSE = {
+    "inverted": "no rest shape: a cell collapses on the way to it (too soft for this load)",
+    "singular": "no rest shape: the way to it ends at a limit point (too soft for this load)",
+    "stalled": "no rest shape was found: the way to it ends before the whole load is off",
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a body is solved; see `Body.solve`."""
+
+    load_steps: int | None = None
+    rtol: float = 1e-10
+    atol: float | None = None
+    max_iterations: int = 25
+    progress: Progress | None = None
+
+    def checked(self, stiffness: float, mesh: Mesh) -> Any:
+        """The runtime's settings.
+
+        Raises:
+            InputError: a tolerance or a count that makes no sense.
+        """
+        if not 0 < self.rtol < 1:
+            raise InputError(f"rtol must lie between 0 and 1, got {self.rtol}.")
+        if self.max_iterations < 1:
+            raise InputError(f"max_iterations must be at least 1, got {self.max_iterations}.")
+        if self.load_steps is not None and self.load_steps < 1:
+            raise InputError(f"load_steps must be at least 1 or None, got {self.load_steps}.")
+        native = core().NewtonSettings()
+        native.rtol, native.max_iterations = self.rtol, self.max_iterations
+        native.load_steps = self.load_steps or 0
+        native.size = mesh.size
+        # Rounding of the internal forces of a body of this stiffness and size, N.
+        native.atol = 1e-14 * stiffness * mesh.size**2 if self.atol is None else self.atol
+        return native
+
+
+def solve(
+    system: Any, start: Floats, prescribed: Floats, native: Any, settings: Settings
+) -> Any:
+    """Run; the result's displacement is ``result.u`` (3n)."""
+    report = settings.progress
+    hook = None if report is None else lambda i: report(as_dict(i))
+    return system.solve(start.ravel(), np.nan_to_num(prescribed).ravel(), native, hook)
+
+
+def require_converged(result: Any, mesh: Mesh, inverse: bool = False) -> None:
+    """Raise for a result that is no stable equilibrium under the whole load.
+
+    Raises:
+        ConvergenceError: cause, load factor, worst cells, history.
+    """
+    name = result.outcome.name
+    if name == "converged":
+        return
+    cause = (_CAUSES_INVERSE if inverse else {}).get(name, _CAUSES[name])
+    cells = worst_cells(result, mesh)
+    last = result.history[-1]
+    raise ConvergenceError(
+        f"no {'rest shape' if inverse else 'equilibrium'}: {cause}; "
+        f"{100 * result.load_factor:.3g} % of the load was reached, the residual is "
+        f"{last.residual:.3g} N where {last.tolerance:.3g} N was asked for, "
+        f"worst cells {cells[:3]}; try a smaller load, a stiffer material or a finer mesh.",
+        history=[as_dict(i) for i in result.history],
+        cells=cells,
+        load_factor=result.load_factor,
+        cause=cause,
+    )
+
+
+def worst_cells(result: Any, mesh: Mesh, count: int = 5) -> list[int]:
+    """The most compressed cell, then those around the largest residual."""
+    cells: list[int] = [result.worst.cell] if result.worst.value <= 0 else []
+    if len(result.last_residual):
+        size = np.linalg.norm(result.last_residual.reshape(-1, 3), axis=1)
+        around = np.nan_to_num(size, nan=np.inf)[mesh.cells].max(axis=1)
+        cells += [int(c) for c in np.argsort(-around, kind="stable")[:count] if c not in cells]
+    return cells[:count]
+
+
+def as_dict(iteration: Any) -> dict[str, float]:
+    """One iteration of the history."""
+    return {name: getattr(iteration, name) for name in _FIELDS}

@@ -1,0 +1,172 @@
+"""A body in equilibrium: displacement, strains and stresses, reactions, how it was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import terms
+from .core import core
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PointValues:
+    """Fields at the quadrature points of all cells, q a cell; measures are rest volumes."""
+
+    F: Floats  # (c, q, 3, 3)
+    P: Floats  # (c, q, 3, 3) Pa
+    psi: Floats  # (c, q) Pa
+    volume: Floats  # (c, q) m³ at rest
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """What a forward solve and a rest shape have in common.
+
+    Attributes:
+        u: (n, 3) displacement of the nodes of the mesh that was solved on, m.
+        iterations: Newton iterations over all load steps.
+        history: one dict an iteration.
+        timings: seconds of "assembly", "factor", "solve", "total".
+        energy: potential energy, J; NaN where the loads have none.
+        reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
+    """
+
+    u: Floats
+    iterations: int
+    history: list[dict[str, float]]
+    timings: dict[str, float]
+    energy: float
+    reactions: Floats
+    _solved: terms.Description = field(repr=False)  # as it was, with its mesh
+    _form: str = field(repr=False)
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3) m, where the nodes went."""
+        return np.asarray(self._solved.mesh.points + self.u)
+
+    def deformation_gradient(self, at: str = "cells") -> Floats:
+        """F from rest to loaded (c, 3, 3), cell averages, or (c, q, 3, 3) with at="quadrature"."""
+        return self._at(self._values.F, at)
+
+    def green_lagrange(self, at: str = "cells") -> Floats:
+        """E = (FᵀF - I)/2, same shapes as `deformation_gradient`."""
+        F = self._values.F
+        return self._at(0.5 * (np.swapaxes(F, -1, -2) @ F - np.eye(3)), at)
+
+    def cauchy(self, at: str = "cells") -> Floats:
+        """σ = P Fᵀ / J, Pa, same shapes as `deformation_gradient`."""
+        F, P = self._values.F, self._values.P
+        J = np.linalg.det(F)[..., None, None]
+        return self._at(P @ np.swapaxes(F, -1, -2) / J, at)
+
+    def volume_ratio(self) -> Floats:
+        """J (c,), the smallest of each cell's quadrature points."""
+        return np.asarray(np.linalg.det(self._values.F).min(axis=1))
+
+    def von_mises(self) -> Floats:
+        """sqrt(3/2 s:s) of the averaged Cauchy stress (c,), Pa."""
+        sigma = self.cauchy()
+        mean = np.trace(sigma, axis1=1, axis2=2)[:, None, None] / 3
+        deviator = sigma - mean * np.eye(3)
+        return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))))
+
+    def write(self, path: str | Path, cell_data: Mapping[str, npt.ArrayLike] | None = None) -> Path:
+        """Write the moved shape as VTU with displacement, J and von Mises stress.
+
+        Positions minus the displacement are those before the solve. Frame LPS, metres, both named
+        in the file. A rest shape's J and stress are those of its loaded state.
+        """
+        fields = {"J [1]": self.volume_ratio(), "von Mises stress [Pa]": self.von_mises()}
+        return self._solved.mesh.moved(self.points).write(
+            path, {"displacement [m]": self.u}, {**fields, **(cell_data or {})}
+        )
+
+    @cached_property
+    def _values(self) -> PointValues:
+        mesh = self._solved.mesh
+        system = core().System(np.ascontiguousarray(mesh.points).ravel())
+        parts, rows = [], []
+        for region in self._solved.regions:
+            if len(region.ids) == 0:
+                continue
+            term = terms.region_term(system, self._solved, region, self._form)
+            terms.set_values(term, region.values)
+            q = len(term.weights)
+            table = term.tabulate("points", self.u.ravel()).reshape(len(region.ids), q, 20)
+            table[..., 19] *= term.weights
+            parts.append(table)
+            rows.append(region.ids)
+        table = np.empty((len(mesh.cells), *parts[0].shape[1:]))
+        table[np.concatenate(rows)] = np.concatenate(parts)
+        shape = (*table.shape[:2], 3, 3)
+        F, P = table[..., :9].reshape(shape), table[..., 9:18].reshape(shape)
+        return PointValues(F, P, table[..., 18], table[..., 19])
+
+    def _at(self, values: Floats, at: str) -> Floats:
+        if at == "quadrature":
+            return values
+        if at != "cells":
+            raise InputError(f'at must be "cells" or "quadrature", got {at!r}.')
+        weight = self._values.volume / self._values.volume.sum(axis=1, keepdims=True)
+        return np.asarray(np.einsum("cq,cqij->cij", weight, values))
+
+
+@dataclass(frozen=True, eq=False)
+class State(Equilibrium):
+    """A body in equilibrium under its loads; `Equilibrium` lists its attributes."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh that ``u`` starts from, the rest shape."""
+        return self._solved.mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Rest(Equilibrium):
+    """The shape without loads, from a loaded one (Mazier 2022, chapter 3); ``u`` is X - x.
+
+    Attributes:
+        method: "inverse" is exact; "reversed-gravity" is an approximation to compare with.
+    """
+
+    method: str = "inverse"
+
+    @property
+    def loaded(self) -> Mesh:
+        """The mesh that was given, the loaded shape."""
+        return self._solved.mesh
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The rest shape; ``body.on(rest.mesh)`` is the same body on it."""
+        return self._solved.mesh.moved(self.points)
+
+
+def outcome(result: Any, built: terms.Built, fixed: npt.NDArray[np.bool_]) -> dict[str, Any]:
+    """The fields of an `Equilibrium` that a converged result gives."""
+    from .newton import as_dict
+
+    t = built.system.timings
+    has_energy = built.system.has_energy()
+    return {
+        "u": result.u.reshape(-1, 3),
+        "iterations": sum(1 for i in result.history if i.iteration > 0),
+        "history": [as_dict(i) for i in result.history],
+        "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
+        "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
+        "reactions": np.where(fixed, result.residual.reshape(-1, 3), 0.0),
+    }

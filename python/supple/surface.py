@@ -1,0 +1,192 @@
+"""A triangulated surface or a cloud of points: scans, the chest wall, skin."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from supple.errors import InputError, MeshError
+from supple.files import existing, metres, replacing
+from supple.mesh_checks import checked_ids, checked_points, some
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+_FORMATS = (".ply", ".stl", ".obj", ".off")
+#: Extents, in the file's numbers, that betray metres read as mm, and mm read as metres.
+_LIKE_METRES = (0.02, 3.0)
+_LIKE_MILLIMETRES = (20.0, 3000.0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface:
+    """A checked surface; its arrays are read-only.
+
+    Attributes:
+        points: (n, 3) m.
+        triangles: (t, 3) point ids, counter-clockwise seen from outside; t = 0 is a point cloud.
+
+    Raises:
+        MeshError: wrong shapes or ids, NaN, no points, triangles without area.
+    """
+
+    points: Floats
+    triangles: Ints = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        points = checked_points(self.points)
+        triangles = checked_ids(self.triangles, 3, len(points), "triangles")
+        flat = np.flatnonzero(_flat(points, triangles))
+        if len(flat):
+            raise MeshError(f"triangles {some(flat)} have no area; remove them.")
+        for name, array in (("points", points), ("triangles", triangles)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def read(cls, path: str | Path, unit: str = "mm", points_only: bool = False) -> Surface:
+        """Read a PLY, STL, OBJ or OFF file.
+
+        Args:
+            path: the file; polygons become triangles, triangles without area are left out.
+            unit: the file's unit of length: "m", "mm", "cm", "dm", "um" or "in".
+            points_only: take the points alone, so that a file without triangles is a point cloud.
+
+        Raises:
+            InputError: missing file, a unit that the extent contradicts (a scan of 0.6 "mm").
+            MeshError: unreadable file, no points, NaN, no triangles.
+        """
+        file = Path(path)
+        scale = metres(unit)
+        raw_points, raw_triangles = _load(existing(file))
+        if not len(raw_points):
+            raise MeshError(f"{file} holds no points; export the surface again.")
+        points = checked_points(raw_points)
+        triangles = checked_ids(raw_triangles, 3, len(points), "triangles")
+        triangles = triangles[~_flat(points, triangles)]
+        if points_only:
+            triangles = triangles[:0]
+        elif not len(triangles):
+            raise MeshError(
+                f"{file} holds {len(points)} points and no triangles; "
+                "mesh it, or pass points_only=True to use it as a point cloud."
+            )
+        check_unit(float(np.ptp(points, axis=0).max()), unit, file)
+        return cls(points * scale, triangles)
+
+    def write(self, path: str | Path, unit: str = "mm", frame: str = "LPS") -> Path:
+        """Write a binary PLY file, whole or not at all; its header names ``unit`` and ``frame``."""
+        file = Path(path)
+        if file.suffix.lower() != ".ply":
+            raise InputError(f"path must end in .ply, got {file.name!r}.")
+        header, body = _ply(self, metres(unit), (f"unit {unit}", f"frame {frame}"))
+        with replacing(file) as aside:
+            aside.write_bytes(header + body)
+        return file
+
+    @property
+    def size(self) -> float:
+        """Largest extent along an axis, m."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    @property
+    def areas(self) -> Floats:
+        """Area (t,) of each triangle, m²."""
+        return np.asarray(np.linalg.norm(_cross(self.points, self.triangles), axis=1) / 2)
+
+    @property
+    def normals(self) -> Floats:
+        """Unit outward normal (t, 3) of each triangle."""
+        cross = _cross(self.points, self.triangles)
+        return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
+
+    def __repr__(self) -> str:
+        return f"Surface({len(self.points)} points, {len(self.triangles)} triangles)"
+
+
+def check_unit(extent: float, unit: str, source: object) -> None:
+    """Refuse a body scan whose largest ``extent`` (in ``unit``) fits another unit a thousand times.
+
+    Raises:
+        InputError: 0.02 to 3 "mm" (so metres), or 20 to 3000 "m" (so mm).
+    """
+    spans = {"mm": (_LIKE_METRES, "m"), "m": (_LIKE_MILLIMETRES, "mm")}
+    if unit not in spans:
+        return
+    (low, high), other = spans[unit]
+    if low <= extent <= high:
+        raise InputError(
+            f"{source} spans {extent:.4g} {unit}, which is no body: it is in {other}; "
+            f"pass unit='{other}'."
+        )
+
+
+def _cross(points: Floats, triangles: Ints) -> Floats:
+    """Twice the area times the normal (t, 3) of each triangle."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _flat(points: Floats, triangles: Ints) -> npt.NDArray[np.bool_]:
+    """Which triangles (t,) have no area beyond the rounding of their edges."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    longest = np.maximum(((b - a) ** 2).sum(axis=1), ((c - a) ** 2).sum(axis=1))
+    return np.asarray(np.linalg.norm(_cross(points, triangles), axis=1) <= 1e-12 * longest)
+
+
+def _load(path: Path) -> tuple[Floats, Ints]:
+    """Points and triangles of a file, as they stand in it."""
+    import trimesh
+
+    if path.suffix.lower() not in _FORMATS:
+        raise MeshError(f"{path} must be one of {', '.join(_FORMATS)}; save it as PLY.")
+    keep_ids: dict[str, Any] = {"maintain_order": True} if path.suffix.lower() == ".obj" else {}
+    said = io.StringIO()
+    try:
+        with redirect_stdout(said), redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            loaded: Any = trimesh.load(path, process=False, **keep_ids)
+    except Exception as error:  # trimesh raises what its parsers happen to raise
+        raise MeshError(
+            f"{path} is no surface that can be read ({error}); save it as PLY."
+        ) from None
+    points, faces = _joined(loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded])
+    if path.suffix.lower() != ".stl":
+        return points, faces
+    points, same = np.unique(points, axis=0, return_inverse=True)  # STL repeats each corner
+    return points, same.ravel()[faces]
+
+
+def _joined(parts: Sequence[Any]) -> tuple[Floats, Ints]:
+    """Points and triangles of trimesh objects, of which some may be clouds."""
+    points, triangles = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+    for part in parts:
+        faces = np.asarray(getattr(part, "faces", ()), dtype=np.int64).reshape(-1, 3)
+        triangles = np.vstack([triangles, faces + len(points)])
+        points = np.vstack([points, np.asarray(part.vertices, dtype=np.float64).reshape(-1, 3)])
+    return points, triangles
+
+
+def _ply(surface: Surface, scale: float, comments: tuple[str, ...]) -> tuple[bytes, bytes]:
+    """Header and body of a little-endian PLY file in units of ``scale`` metres."""
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        *(f"comment {comment}" for comment in comments),
+        f"element vertex {len(surface.points)}",
+        *(f"property double {axis}" for axis in "xyz"),
+    ]
+    faces = np.zeros(len(surface.triangles), dtype=[("n", "u1"), ("ids", "<i4", 3)])
+    faces["n"], faces["ids"] = 3, surface.triangles
+    if len(faces):
+        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    header = "\n".join([*lines, "end_header", ""]).encode("ascii")
+    return header, (surface.points / scale).astype("<f8").tobytes() + faces.tobytes()

@@ -1,0 +1,183 @@
+"""A body's description → the terms of its equilibrium in the runtime, direct or inverse.
+
+    regions, gravity, tractions, pressures, skins, sliding supports, nodal forces → _core.System
+
+Structure (which terms on which cells) and values (parameters, loads) are apart: new values reach the
+terms that exist, so pattern, reduction and symbolic factor live as long as the structure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .core import core
+from .laws import compiled
+
+if TYPE_CHECKING:
+    from .kernels.reader import Law
+    from .mesh import Mesh
+    from .surface import Surface
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass
+class Region:
+    """A law on some cells, or on some facets as their skin; values are (count, size) rows."""
+
+    law: Law
+    ids: Ints
+    values: dict[str, Floats]
+
+
+@dataclass
+class FacetLoad:
+    """A traction (3,) or a pressure (1,), Pa, on boundary facets in VTK order."""
+
+    facets: Ints
+    value: Floats
+    per: str = "rest"
+
+
+@dataclass
+class Slide:
+    """Nodes held to a rigid surface without friction; stiffness (k,) N/m."""
+
+    nodes: Ints
+    surface: Surface
+    stiffness: Floats
+
+
+@dataclass
+class Description:
+    """What a body is made of; `Body` fills it, `build` reads it."""
+
+    mesh: Mesh
+    regions: list[Region]
+    density: Floats  # (c, 1) kg/m³
+    gravity: Floats  # (3,) m/s²
+    forces: Floats  # (n, 3) N
+    quadrature: int | None = None
+    tractions: list[FacetLoad] = field(default_factory=list)
+    pressures: list[FacetLoad] = field(default_factory=list)
+    skins: list[Region] = field(default_factory=list)  # ids are facets (f, nodes), VTK order
+    slides: list[Slide] = field(default_factory=list)
+
+
+@dataclass
+class Built:
+    """A runtime system and its terms, by the part of the description that each stands for."""
+
+    system: Any
+    regions: list[Any]
+    skins: list[Any]
+    tractions: list[Any]
+    pressures: list[Any]
+    body_force: Any
+    forces: Any
+
+
+def build(d: Description, inverse: bool = False, density_of: str = "rest") -> Built:
+    """Make the system; kernels that are not compiled yet are compiled here."""
+    system = core().System(np.ascontiguousarray(d.mesh.points).ravel())
+    built = Built(system, [], [], [], [], None, core().NodalForce(np.zeros(d.mesh.points.size)))
+    form = "inverse" if inverse else "direct"
+    for region in d.regions:
+        built.regions.append(region_term(system, d, region, form) if len(region.ids) else None)
+    per_rest = inverse and density_of == "rest"
+    load = "body_force_rest" if per_rest else "body_force"
+    built.body_force = _load(system, load, d.mesh.element, _cells(d.mesh))
+    for traction in d.tractions:
+        moved = (traction.per == "rest") == inverse
+        unit = "traction_moved" if moved else "traction"
+        built.tractions.append(_load(system, unit, d.mesh.table.facet, _facets(d, traction.facets)))
+    for pressure in d.pressures:
+        unit = "pressure" if inverse else "pressure_moved"
+        built.pressures.append(_load(system, unit, d.mesh.table.facet, _facets(d, pressure.facets)))
+    for skin in d.skins:
+        built.skins.append(skin_term(system, d, skin, f"skin_{form}"))
+    for slide in d.slides:
+        system.add(_slide(system, slide, inverse))
+    system.add(built.forces)
+    return built
+
+
+def refresh(built: Built, d: Description) -> None:
+    """Hand the description's present values to the terms."""
+    for term, region in [*zip(built.regions, d.regions, strict=True),
+                         *zip(built.skins, d.skins, strict=True)]:  # fmt: skip
+        if term is not None:
+            set_values(term, region.values)
+    built.body_force.set_field("value", (d.density * d.gravity).ravel())
+    for term, load in [*zip(built.tractions, d.tractions, strict=True),
+                       *zip(built.pressures, d.pressures, strict=True)]:  # fmt: skip
+        term.set_field("value", np.tile(load.value, len(load.facets)))
+    built.forces.set_forces(d.forces.ravel())
+
+
+def region_term(system: Any, d: Description, region: Region, form: str) -> Any:
+    """The term of a law on its cells, added to the system."""
+    from .kernels.unit import Unit
+
+    unit = Unit(form, d.mesh.element, region.law.path, d.quadrature)
+    return _add(system, compiled(unit), _cells(d.mesh)[region.ids])
+
+
+def skin_term(system: Any, d: Description, skin: Region, form: str) -> Any:
+    """The term of a skin on its facets, added to the system."""
+    from .kernels.unit import Unit
+
+    unit = Unit(form, d.mesh.table.facet, skin.law.path)
+    return _add(system, compiled(unit), _facets(d, skin.ids))
+
+
+def set_values(term: Any, values: dict[str, Floats]) -> None:
+    """Parameters (count, size) to the term's fields."""
+    for name, value in values.items():
+        term.set_field(name, value.ravel())
+
+
+def _load(system: Any, form: str, element: str, cells: npt.NDArray[np.int32]) -> Any:
+    from .kernels.unit import Unit
+
+    term = _add(system, compiled(Unit(form, element)), cells)
+    term.is_load = True
+    return term
+
+
+def _add(system: Any, library: str, cells: npt.NDArray[np.int32]) -> Any:
+    term = core().KernelTerm(library, system, cells)
+    system.add(term)
+    return term
+
+
+def _slide(system: Any, slide: Slide, inverse: bool) -> Any:
+    surface = slide.surface
+    return core().Sliding(
+        system, slide.nodes.tolist(), slide.stiffness, surface.points,
+        surface.triangles.astype(np.int32), inverse,
+    )  # fmt: skip
+
+
+def _cells(mesh: Mesh) -> npt.NDArray[np.int32]:
+    """Cells in kernel order."""
+    return np.ascontiguousarray(mesh.cells[:, mesh.table.from_vtk], dtype=np.int32)
+
+
+def _facets(d: Description, facets: Ints) -> npt.NDArray[np.int32]:
+    """Facets in kernel order."""
+    from .kernels.cells import FACETS
+
+    order = FACETS[d.mesh.table.facet].from_vtk
+    return np.ascontiguousarray(facets[:, order], dtype=np.int32)
+
+
+def snapshot(d: Description) -> Description:
+    """A copy that later changes of the body do not reach; arrays are shared, never written to."""
+    regions = [Region(r.law, r.ids, dict(r.values)) for r in d.regions]
+    return replace(d, regions=regions)

@@ -1,0 +1,74 @@
+"""A case says exactly what the same lines of Python say, and a wrong one names its key."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from supple.case import Table, read_case
+from supple.cli import _where
+from supple.errors import InputError
+from supple.mesh import Mesh
+
+BOX = "[mesh.box]\ncells = [2, 1, 1]\nsize = [0.2, 0.1, 0.1]\nelement = 'Q1'\n"
+
+
+def case(tmp_path: Path, text: str) -> Table:
+    file = tmp_path / "case.toml"
+    file.write_text(text, encoding="utf-8")
+    return read_case(file)
+
+
+@pytest.fixture(scope="module")
+def mesh() -> Mesh:
+    """Two cubes of 0.1 m along x: 12 nodes at x = 0, 0.1, 0.2."""
+    return Mesh.box(cells=(2, 1, 1), size=(0.2, 0.1, 0.1), element="Q1")
+
+
+@pytest.mark.parametrize(
+    ("where", "expected"),
+    [
+        ('{ x = "min" }', lambda p: p[:, 0] == 0.0),
+        ('{ x = "max", y = 0 }', lambda p: (p[:, 0] == 0.2) & (p[:, 1] == 0.0)),
+        ("{ x = 0.1000000001 }", lambda p: np.isclose(p[:, 0], 0.1)),
+        ("{ x = [0.05, 0.2] }", lambda p: p[:, 0] > 0.05),
+        ("[0, 3]", lambda p: np.isin(np.arange(len(p)), [0, 3])),
+    ],
+)
+def test_a_place_chooses_the_nodes_that_lie_there(
+    tmp_path: Path, mesh: Mesh, where: str, expected: Any
+) -> None:
+    chosen = _where.nodes(case(tmp_path, f"where = {where}"), mesh)
+    np.testing.assert_array_equal(mesh.nodes(chosen), np.flatnonzero(expected(mesh.points)))
+
+
+def test_a_place_chooses_cells_by_their_middle(tmp_path: Path, mesh: Mesh) -> None:
+    chosen = _where.cells(case(tmp_path, "where = { x = [0.1, 0.2] }"), mesh)
+    middles = mesh.points[mesh.cells[mesh.cell_ids(chosen)]].mean(axis=1)
+    np.testing.assert_allclose(middles, [[0.15, 0.05, 0.05]], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        ("3", "where must be a tag, a list of ids or a place"),
+        ("[]", "where must be a tag, a list of ids or a place"),
+        ("[0.5]", "where must be a tag, a list of ids or a place"),
+        ("[true]", "where must be a tag, a list of ids or a place"),
+        ("{ r = 0 }", "where must be a tag, a list of ids or a place"),
+        ('{ x = "low" }', 'where.x must be "min", "max", a number or [low, high] in m'),
+        ("{ x = [0, 1, 2] }", 'where.x must be "min", "max", a number or [low, high] in m'),
+        ("{ x = 0.7 }", "where: no nodes chosen"),
+        ("[99]", "where: `where` names nodes 99"),
+        ('"base"', "where: the mesh has no tag 'base'"),
+    ],
+)
+def test_a_place_that_is_none_names_its_key(
+    tmp_path: Path, mesh: Mesh, where: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=re.escape("case.toml: " + message)):
+        _where.nodes(case(tmp_path, f"where = {where}"), mesh)
