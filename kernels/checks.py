@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .kinematics import Kinematics
-from .reader import EnergyFileError, Law
+from .reader import EnergyFileError, Law, blamed
 from .tensors import Tensor
 
 _EDGES = np.array([[1.0, 0.2, 0.1], [0.1, 0.9, 0.3], [0.0, 0.2, 1.1]])
@@ -20,10 +20,11 @@ def energy_at(law: Law, F: np.ndarray, values: dict[str, Any], edges: Any = _EDG
     """ψ, Pa, of the deformation gradient ``F`` (3, 3) and parameters name → value."""
     tensors = {n: np.asarray(v).view(Tensor) if np.ndim(v) else v for n, v in values.items()}
     k = Kinematics(np.asarray(F, float).view(Tensor), np.asarray(edges).view(Tensor))
-    psi = law.psi(k, tensors)
-    if np.ndim(psi) != 0:
+    with blamed(law), np.errstate(all="ignore"):  # NaN is refused by its caller
+        psi = law.psi(k, tensors)
+    if np.ndim(psi) != 0 or callable(psi):
         raise EnergyFileError(
-            f"{law.path}: the energy is not a scalar but has shape {np.shape(psi)}; "
+            f"{law.path}:{law.line}: the energy is not a scalar but has shape {np.shape(psi)}; "
             "contract it, for example with tr() or inner()."
         )
     return float(psi)
@@ -69,7 +70,7 @@ def require_sound(law: Law) -> None:
     values = {p.name: p.default for p in law.parameters}
     scale = stiffness_scale(law, values)
     if not np.isfinite(scale) or scale == 0.0:
-        raise EnergyFileError(f"{law.path}: the energy has no finite stiffness at F = I; check it.")
+        raise EnergyFileError(f"{law.path}:{law.line}: the energy has no finite stiffness at F = I; check it.")
     if "stress_free" not in law.exceptions:
         _require_stress_free(law, values, scale)
     if "objective" not in law.exceptions:
@@ -80,10 +81,10 @@ def _require_stress_free(law: Law, values: dict[str, Any], scale: float) -> None
     declare = 'subtract its value at F = I, or declare exceptions = {"stress_free"}.'
     psi = energy_at(law, np.eye(3), values)
     if abs(psi) > 1e-10 * scale:
-        raise EnergyFileError(f"{law.path}: psi at F = I is {psi:.6g} Pa, not 0; {declare}")
+        raise EnergyFileError(f"{law.path}:{law.line}: psi at F = I is {psi:.6g} Pa, not 0; {declare}")
     stress = np.abs(stress_at(law, np.eye(3), values)).max()
     if stress > 1e-6 * scale:
-        raise EnergyFileError(f"{law.path}: the stress at F = I is {stress:.6g} Pa, not 0; {declare}")
+        raise EnergyFileError(f"{law.path}:{law.line}: the stress at F = I is {stress:.6g} Pa, not 0; {declare}")
 
 
 def _require_objective(law: Law, values: dict[str, Any], scale: float) -> None:
@@ -95,7 +96,7 @@ def _require_objective(law: Law, values: dict[str, Any], scale: float) -> None:
         psi, turned = (energy_at(law, Q @ F, values) for Q in (np.eye(3), random_rotation(rng)))
         if abs(psi - turned) > 1e-9 * max(scale, abs(psi)):
             raise EnergyFileError(
-                f"{law.path}: is not objective: a rotation changes psi from {psi:.6g} to "
+                f"{law.path}:{law.line}: is not objective: a rotation changes psi from {psi:.6g} to "
                 f"{turned:.6g} Pa; write it in C, its invariants or E, or declare "
                 'exceptions = {"objective"}.'
             )

@@ -102,7 +102,8 @@ def _forms(unit: Unit) -> tuple[Forms, str]:
     law = reader.read(unit.law)
     checks.require_sound(law)
     degree = elements.STIFFNESS_DEGREE[unit.element] if unit.degree is None else unit.degree
-    return _LAW_FORMS[unit.form](law, unit.element, degree), law.source_hash
+    with reader.blamed(law):
+        return _LAW_FORMS[unit.form](law, unit.element, degree), law.source_hash
 
 
 def _size(coefficient: Any) -> int:

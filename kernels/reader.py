@@ -12,7 +12,9 @@ import ast
 import difflib
 import hashlib
 import inspect
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +29,10 @@ EXCEPTIONS = ("stress_free", "objective", "isotropic", "barrier")
 #: Functions by which an energy file speaks.
 ENTRY_POINTS = ("psi", "psi_dev", "psi_vol", "psi_surface")
 
+#: Names that a parameter may not have: the kernels' own fields and the arguments of `supple.Body`.
+RESERVED = ("u", "thickness", "mesh", "material", "formulation", "density", "quadrature", "where",
+            "cells", "number")  # fmt: skip
+
 _BUILTINS: dict[str, Any] = {"sum": sum, "zip": zip, "range": range, "abs": abs}
 _EXPRESSIONS = (
     ast.BinOp, ast.UnaryOp, ast.Call, ast.Attribute, ast.Name, ast.Constant, ast.Tuple, ast.Load,
@@ -37,6 +43,22 @@ _EXPRESSIONS = (
 
 class EnergyFileError(Exception):
     """An energy file that cannot be used: one sentence with file, line and remedy."""
+
+
+@contextmanager
+def blamed(law: Law) -> Iterator[None]:
+    """Whatever the law's own expressions raise becomes an EnergyFileError with their line."""
+    try:
+        yield
+    except EnergyFileError:
+        raise
+    except Exception as problem:
+        frames = traceback.extract_tb(problem.__traceback__)
+        line = next((f.lineno for f in frames[::-1] if f.filename == str(law.path)), law.line)
+        raise EnergyFileError(
+            f"{law.path}:{line}: cannot be computed ({type(problem).__name__}: {problem}); "
+            "check the shapes and arguments of its expression."
+        ) from problem
 
 
 @dataclass(frozen=True)
@@ -63,6 +85,7 @@ class Law:
         parameters: in the order of the kernels' coefficients.
         exceptions: subset of EXCEPTIONS.
         source_hash: hash of its text, the law's part of the cache key.
+        line: where its energy is defined.
     """
 
     name: str
@@ -71,6 +94,7 @@ class Law:
     parameters: tuple[Parameter, ...]
     exceptions: frozenset[str]
     source_hash: str
+    line: int
     _code: CodeType = field(repr=False, compare=False)
 
     @cached_property
@@ -97,7 +121,7 @@ class Law:
         volumetric = self._functions["psi_vol"](J, **self.arguments("psi_vol", values))
         if not isinstance(volumetric, energy.Volumetric):
             raise EnergyFileError(
-                f"{self.path}: psi_vol must return a Volumetric, got {type(volumetric).__name__}; "
+                f"{self.path}:{self.line}: psi_vol must return a Volumetric, got {type(volumetric).__name__}; "
                 "use log_volumetric(J, bulk) or another helper of supple.energy."
             )
         return volumetric
@@ -135,6 +159,7 @@ def read(path: Path | str) -> Law:
         parameters=checker.parameters(),
         exceptions=checker.exceptions,
         source_hash=hashlib.sha256(ast.dump(tree).encode()).hexdigest(),
+        line=next(f.lineno for n, f in checker.functions.items() if n in ENTRY_POINTS),
         _code=compile(_without_annotations(tree), str(path), "exec"),
     )
 
@@ -187,7 +212,7 @@ class _Checker:
                 self.imported.add(alias.name)
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             raise self.fail(node, "imports something else than supple.energy; remove that import.")
-        elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "exceptions":
+        elif isinstance(node, ast.Assign) and [ast.unparse(t) for t in node.targets] == ["exceptions"]:
             self.exceptions = self.declared(node)
         elif not isinstance(node, ast.FunctionDef):
             kind = type(node).__name__
@@ -207,11 +232,15 @@ class _Checker:
         a = f.args
         if a.vararg or a.kwarg or a.kwonlyargs or a.posonlyargs or f.decorator_list:
             raise self.fail(f, f"{f.name} may only have plain arguments and no decorator.")
+        if f.name in ENTRY_POINTS and len(a.args) <= len(a.defaults):
+            raise self.fail(f, f"{f.name} must begin with {'J' if f.name == 'psi_vol' else 'k'}.")
+        for default in a.defaults:  # they run when the file is read
+            self.number(f, f"a default of {f.name}", default)
         known = {x.arg for x in a.args} | self.imported | set(_BUILTINS) | set(self.functions)
         for index, node in enumerate(f.body):
             if index == 0 and isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
                 continue
-            if isinstance(node, ast.Assign):
+            if isinstance(node, ast.Assign) and len(node.targets) == 1:
                 self.expression(node.value, known)
                 for name in ast.walk(node.targets[0]):
                     if isinstance(name, ast.Name):
@@ -261,14 +290,21 @@ class _Checker:
                     raise self.fail(argument, f"{p.name} differs from its other declaration.")
         return tuple(found.values())
 
+    def number(self, node: ast.AST, what: str, default: ast.expr) -> Any:
+        try:
+            value = ast.literal_eval(default)
+            float(sum(value)) if isinstance(value, tuple) else float(value)
+        except (ValueError, TypeError):
+            raise self.fail(node, f"{what} is not a number.") from None
+        return value
+
     def parameter(self, argument: ast.arg, default: ast.expr | None) -> Parameter:
         name = argument.arg
         if argument.annotation is None or default is None:
             raise self.fail(argument, f"{name} needs a type and a default, such as {name}: Pa = 1e3.")
-        try:
-            value = ast.literal_eval(default)
-        except (ValueError, TypeError):
-            raise self.fail(argument, f"the default of {name} is not a number.") from None
+        if name in RESERVED:
+            raise self.fail(argument, f"{name} is a name of Supple's own; call the parameter otherwise.")
+        value = self.number(argument, f"the default of {name}", default)
         kind = self.kind(argument.annotation, name)
         if not kind.admits(value):
             raise self.fail(argument, f"the default of {name} is {value}, outside {kind.range()}.")

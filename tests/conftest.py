@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+
+#: Compiles the units named on its command line, or finds them compiled.
+_COMPILE = """
+import sys
+from supple.kernels.unit import parse
+from supple.laws import compiled, folder
+for name in sys.argv[1:]:
+    compiled(parse(name, folder()))
+"""
 
 
 @pytest.fixture(scope="session")
@@ -22,3 +35,70 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip(f"needs the data folder {folder}, which is not part of the repository")
     return folder
+
+
+@pytest.fixture(scope="session")
+def compiled_units(request: pytest.FixtureRequest) -> None:
+    """Every kernel library that the chosen tests name in their parameter ``unit``, compiled."""
+    names = sorted(
+        {
+            item.callspec.params["unit"]
+            for item in request.session.items
+            if "unit" in getattr(getattr(item, "callspec", None), "params", {})
+        }
+    )
+    halves = [subprocess.Popen([sys.executable, "-c", _COMPILE, *names[k::2]]) for k in (0, 1)]
+    assert [half.wait() for half in halves] == [0, 0]
+
+
+@pytest.fixture(scope="session")
+def distorted() -> Callable:
+    """distorted(element, cells=(1, 1, 1), curved=True, seed=0): a unit box, every node moved.
+
+    Corners by up to 0.12 of a cell, so no hexahedron is affine; at degree 2 every other node by up
+    to 0.02 more, so that edges and faces are curved, if ``curved``.
+    """
+    from supple import Mesh
+
+    def make(element: str, cells: tuple = (1, 1, 1), curved: bool = True, seed: int = 0) -> Mesh:
+        rng = np.random.default_rng(seed)
+        mesh = Mesh.box(cells, (1.0, 1.0, 1.0), element[0] + "1")
+        step = 1 / np.array(cells)
+        mesh = mesh.moved(mesh.points + 0.12 * step * rng.uniform(-1, 1, mesh.points.shape))
+        if element[1] == "1":
+            return mesh
+        mesh = mesh.elevated()
+        if not curved:
+            return mesh
+        return mesh.moved(mesh.points + 0.02 * step * rng.uniform(-1, 1, mesh.points.shape))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def assert_slope() -> Callable:
+    """assert_slope(f, slope, x, d, h): ``slope`` is the derivative of f at x along d.
+
+    Central differences at h and h/10 miss it by errors that fall as h², or by rounding alone where
+    f is a polynomial of degree 2.
+    """
+
+    def check(f: Callable, slope: object, x: np.ndarray, d: np.ndarray, h: float) -> None:
+        size = np.abs(slope).max()
+        assert size > 0
+        errors = [
+            np.abs((f(x + e * d) - f(x - e * d)) / (2 * e) - slope).max() / size
+            for e in (h, h / 10)
+        ]
+        assert errors[1] < 1e-4, errors
+        assert errors[0] / errors[1] > 50 or max(errors) < 1e-9, f"not of order 2: {errors}"
+
+    return check
+
+
+@pytest.fixture(scope="session")
+def rotation() -> np.ndarray:
+    """A rotation (3, 3) by 1.1 rad about an axis in general position (Rodrigues)."""
+    axis = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25)
+    K = np.cross(np.eye(3), axis)
+    return np.eye(3) + np.sin(1.1) * K + (1 - np.cos(1.1)) * K @ K

@@ -9,8 +9,14 @@ namespace supple {
 
 namespace {
 
-/// Cells that one thread treats between two looks at the schedule.
-constexpr Index kGroup = 16;
+constexpr Index kSmallestGroup = 16;   // cells that one thread treats in one go, at least
+constexpr Index kMostGroups = 48;      // few groups need few colours, and a colour ends in a barrier
+constexpr Index kWorthThreads = 1000;  // fewer cells are done before a second thread is awake
+
+Index group_size(Index cells, Index lanes) {
+  const Index size = std::max(kSmallestGroup, (cells + kMostGroups - 1) / kMostGroups);
+  return (size + lanes - 1) / lanes * lanes;
+}
 
 }  // namespace
 
@@ -24,7 +30,8 @@ KernelTerm::KernelTerm(std::shared_ptr<const KernelLibrary> library,
   const supple_library& table = library_->table();
   require_size("nodes per cell", cells_.cols(), table.nodes, "pass cells of the kernels' element");
   const auto nodes = static_cast<Index>(points_->size() / 3);
-  colouring_ = colour_cells(cells_, nodes, std::max<Index>(kGroup, table.lanes));
+  group_ = group_size(static_cast<Index>(cells_.rows()), table.lanes);
+  colouring_ = colour_cells(cells_, nodes, group_);
   fields_.resize(static_cast<std::size_t>(table.field_count));
   energy_ = library_->find("energy");
   residual_ = &library_->require("residual");
@@ -90,13 +97,13 @@ void KernelTerm::each(const supple_kernel& kernel, const ConstVector& u, Consume
   require_fields();
   const supple_library& table = library_->table();
   const Index lanes = table.lanes, cells = static_cast<Index>(cells_.rows());
-  const Index group = std::max(kGroup, lanes);
+  const Index group = group_;
   std::size_t w_size = 0;
   for (int f = 0; f < kernel.field_count; ++f) {
     w_size += static_cast<std::size_t>(table.fields[kernel.fields[f]].size);
   }
   const auto width = static_cast<std::size_t>(lanes);
-#pragma omp parallel
+#pragma omp parallel if (cells >= kWorthThreads)
   {
     Buffers b;
     b.A.resize(static_cast<std::size_t>(kernel.rows) * static_cast<std::size_t>(kernel.cols) * width);
@@ -105,7 +112,7 @@ void KernelTerm::each(const supple_kernel& kernel, const ConstVector& u, Consume
     for (Index colour = 0; colour < colouring_.colours(); ++colour) {
       const Index begin = colouring_.offset[static_cast<std::size_t>(colour)];
       const Index end = colouring_.offset[static_cast<std::size_t>(colour) + 1];
-#pragma omp for schedule(static)
+#pragma omp for schedule(dynamic)
       for (Index k = begin; k < end; ++k) {
         const Index batch = colouring_.order[static_cast<std::size_t>(k)];
         const Index last = std::min(cells, (batch + 1) * group);

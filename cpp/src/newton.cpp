@@ -15,7 +15,7 @@ constexpr double kShortest = 1.0 / 1024.0;  // of a Newton step
 constexpr double kArmijo = 1e-4;            // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
 
-/// How one load step is attacked.
+/// How one load step is attacked: full Newton steps, or steps that must lower the energy.
 enum class Manner { Full, Guarded };
 
 /// Follows the path from load to load; owns what the load steps share.
@@ -138,11 +138,15 @@ class Path {
   Outcome factorise(const Vector& u, double s, Manner manner) {
     system_.assemble_tangent(u, loads(s));
     shift_ = 0.0;
+    indefinite_ = false;
     FactorStatus status = system_.factorise();
     if (status.ok()) return Outcome::Converged;
     if (status.cause == FactorStatus::Cause::NotFinite) return Outcome::Inverted;
     if (status.cause == FactorStatus::Cause::Singular) return Outcome::Singular;
-    if (manner == Manner::Full) return Outcome::LimitPoint;
+    if (manner == Manner::Full) {  // on the way an indefinite K is no fault, at the end it is
+      indefinite_ = system_.factorise_indefinite().ok();
+      return indefinite_ ? Outcome::Converged : Outcome::LimitPoint;
+    }
     for (shift_ = 1e-3; shift_ < kLargestShift; shift_ *= 10.0) {
       if (system_.factorise(shift_).ok()) return Outcome::Converged;
     }
@@ -202,8 +206,8 @@ class Path {
   /// An equilibrium with an indefinite tangent is not where a body rests.
   Outcome stable(const Vector& u, double s) {
     if (!has_energy_) return Outcome::Converged;
+    if (shift_ == 0.0 && !indefinite_) return Outcome::Converged;  // K was definite one step ago
     system_.assemble_tangent(u, loads(s));
-    if (shift_ == 0.0) return Outcome::Converged;  // its factor's pivots were positive one step ago
     if (system_.factorise().ok()) return Outcome::Converged;
     result_.negative = system_.inertia().negative;
     return result_.negative > 0 ? Outcome::Unstable : Outcome::Converged;
@@ -246,6 +250,7 @@ class Path {
   Vector start_fixed_, offset_;
   bool has_energy_ = false;
   double shift_ = 0.0;
+  bool indefinite_ = false;
   NewtonResult result_;
 };
 

@@ -61,6 +61,7 @@ Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage)
   require_size("free", free.size(), pattern.dofs(), "give one entry for each dof, three a node");
   Reduction reduction;
   reduction.unknown = number_free(free, reduction.dof);
+  reduction.full_nonzeros = pattern.nonzeros();
   CscPattern& csc = reduction.pattern;
   csc.size = reduction.free();
   csc.lower = storage == Storage::Lower;
@@ -72,6 +73,7 @@ Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage)
 }
 
 void Reduction::gather(const ConstVector& values, MutableVector reduced) const {
+  require_size("values", values.size(), full_nonzeros, "assemble them on the reduced pattern");
   require_size("reduced", reduced.size(), pattern.nonzeros(), "size it as pattern.nonzeros()");
   for (std::size_t k = 0; k < source.size(); ++k)
     reduced[static_cast<Eigen::Index>(k)] = values[source[k]];

@@ -32,6 +32,7 @@ void System::add(std::shared_ptr<Term> term) {
   pattern_.reset();
   reduction_.reset();
   factor_.reset();
+  indefinite_.reset();
 }
 
 void System::set_free(Mask free) {
@@ -40,6 +41,7 @@ void System::set_free(Mask free) {
   free_ = std::move(free);
   reduction_.reset();
   factor_.reset();
+  indefinite_.reset();
 }
 
 bool System::has_energy() const {
@@ -134,7 +136,21 @@ FactorStatus System::factorise(double shift) {
       reduced_[r.pattern.start[static_cast<std::size_t>(j)]] += shift * mean;
     }
   }
+  current_ = factor_.get();
   return factor_->factorise(reduced_);
+}
+
+FactorStatus System::factorise_indefinite() {
+  const Reduction& r = reduction();
+  const Stopwatch watch(timings.factor);
+  if (!indefinite_) {
+    indefinite_ = std::make_unique<Factor>(Kind::QuasiDefinite);
+    indefinite_->analyse(r.pattern);
+  }
+  reduced_.resize(r.pattern.nonzeros());
+  r.gather(values_, reduced_);
+  current_ = indefinite_.get();
+  return indefinite_->factorise(reduced_);
 }
 
 Vector System::solve(const ConstVector& rhs) {
@@ -143,7 +159,7 @@ Vector System::solve(const ConstVector& rhs) {
   Vector x(r.free());
   Refinement refinement;
   refinement.tolerance = 1e-12;
-  factor_->solve(r.restrict(rhs), x, refinement);
+  current_->solve(r.restrict(rhs), x, refinement);
   Vector full = Vector::Zero(dofs());
   r.add_to(x, 1.0, full);
   return full;
@@ -156,12 +172,8 @@ Vector System::apply(const ConstVector& x) {
 }
 
 Inertia System::inertia() {
-  const Reduction& r = reduction();
-  Factor factor(Kind::QuasiDefinite);
-  factor.analyse(r.pattern);
-  r.gather(values_, reduced_);
-  if (!factor.factorise(reduced_).ok()) return {0, 1, 0, 0.0};
-  return factor.inertia();
+  if (!factorise_indefinite().ok()) return {0, 1, 0, 0.0};
+  return indefinite_->inertia();
 }
 
 }  // namespace supple

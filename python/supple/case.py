@@ -138,9 +138,11 @@ class Table:
         names = (f"{self._below(key)} {number}" for number in range(1, len(value) + 1))
         return [Table(item, self.file, name) for item, name in zip(value, names, strict=True)]
 
-    def remaining(self) -> dict[str, float]:
-        """All keys not asked for so far, each a finite number: the parameters of a law."""
-        return {key: self.number(key) for key in self._values if key not in self._asked}
+    def numbers(self, known: Collection[str]) -> dict[str, Any]:
+        """The `known` keys that are there, as finite numbers; any other left over is refused."""
+        self._asked.update(known)
+        self.done()
+        return {key: self.number(key) for key in known if key in self._values}
 
     def done(self) -> None:
         """Refuse every key that nobody asked for."""

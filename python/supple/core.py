@@ -1,7 +1,8 @@
-"""The compiled runtime, loaded once with a BLAS that knows the processor.
+"""The compiled runtime, loaded once with settings that its libraries read only at that moment.
 
 Debian 12's OpenBLAS takes its slowest kernels on processors that it does not know, five times
-slower, unless the variable below is set before it is loaded; it is set for that moment only.
+slower, unless it is told; GCC's OpenMP lets waiting threads spin for milliseconds, which on a busy
+machine takes the time from the thread that they wait for. A value that the user set stays.
 """
 
 from __future__ import annotations
@@ -13,9 +14,6 @@ from types import ModuleType
 
 from .errors import SuppleError
 
-_VARIABLE = "OPENBLAS_CORETYPE"
-
-
 @cache
 def core() -> ModuleType:
     """``supple._core``.
@@ -23,18 +21,21 @@ def core() -> ModuleType:
     Raises:
         SuppleError: it was not built.
     """
-    chosen = None if _VARIABLE in os.environ else _core_type()
-    if chosen:
-        os.environ[_VARIABLE] = chosen
+    wanted = {"OPENBLAS_CORETYPE": _core_type(), "GOMP_SPINCOUNT": "2000"}
+    mine = {name: v for name, v in wanted.items() if v and name not in os.environ}
+    os.environ.update(mine)
     try:
         from supple import _core
     except ImportError as problem:
-        raise SuppleError(f"the compiled part of Supple is missing ({problem}); run: make build.")
+        raise SuppleError(
+            f"the compiled part of Supple is missing ({problem}); run: make build."
+        ) from None
     finally:
-        if chosen:
-            del os.environ[_VARIABLE]
+        for name in mine:
+            del os.environ[name]
     _core.set_blas_threads(1)
-    return _core
+    module: ModuleType = _core
+    return module
 
 
 def _core_type() -> str | None:

@@ -120,20 +120,37 @@ TEST(points_on_the_surface_stay) {
   }
 }
 
-/// A roof: queries over its ridge and over its ends are as near to both sides.
+/// Random roofs: what lands on the ridge is as near to both sides, to the last bit.
 TEST(ties_go_to_the_lowest_triangle) {
-  Points vertices(4, 3);
-  vertices << 0.1, 0, 0, 0.1, 1.3, 0, -1, 0.4, -1.1, 1.2, 0.4, -0.9;
-  for (const bool flipped : {false, true}) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> uniform(0.1, 1.0);
+  for (int repeat = 0; repeat < 200; ++repeat) {
+    Points vertices(4, 3);
+    vertices << 0, 0, 0, 0.2 * uniform(random), 1 + uniform(random), 0.2 * uniform(random), //
+        -3, 1, -5, 3, 1, -5;
     Triangles triangles(2, 3);
     triangles << 1, 0, 2, 0, 1, 3;
-    if (flipped) triangles.row(0).swap(triangles.row(1));
-    Points query(50, 3);
-    for (int i = 0; i < 50; ++i)
-      query.row(i) << 0.1, -0.3 + i / 27.0, 1.0 + 0.01 * i;
+    if (repeat % 2 == 1) triangles.row(0).swap(triangles.row(1));
+    Points query(20, 3);
+    for (int i = 0; i < 20; ++i)
+      query.row(i) = vertices.row(1) * (i / 15.0) + 0.3 * Eigen::RowVector3d(0, 0, 1);
     const Projection p = closest_points(query, vertices, triangles);
     CHECK((p.triangle.array() == 0).all());
     CHECK((p.feature.array() >= 1).all());
+  }
+}
+
+/// On a vertex all triangles around it are at distance zero; they lie in many boxes of the tree.
+TEST(ties_across_the_tree_go_to_the_lowest_triangle) {
+  Surface s = bumpy(9);
+  for (Eigen::Index t = 0; t < s.triangles.rows(); ++t) // scatter the numbers
+    s.triangles.row(t).swap(s.triangles.row((t * 77 + 5) % s.triangles.rows()));
+  const Projection p = closest_points(s.vertices, s.vertices, s.triangles);
+  for (int v = 0; v < s.vertices.rows(); ++v) {
+    int lowest = 0;
+    while (!(s.triangles.row(lowest).array() == v).any())
+      ++lowest;
+    CHECK(p.triangle[v] == lowest && p.distance[v] == 0.0);
   }
 }
 

@@ -170,6 +170,9 @@ TEST(wrong_arguments_are_refused) {
   CHECK_THROWS(colour_cells(cells, 5, 0), ShapeError);
   const BlockPattern pattern = block_pattern(5, {cells});
   CHECK_THROWS(reduce(pattern, Mask::Constant(4, true), Storage::Full), ShapeError);
+  const Reduction reduction = reduce(pattern, Mask::Constant(15, true), Storage::Full);
+  Vector reduced(reduction.pattern.nonzeros());
+  CHECK_THROWS(reduction.gather(Vector::Zero(pattern.nonzeros() - 1), reduced), ShapeError);
 }
 
 TEST(empty_meshes_are_no_special_case) {

@@ -14,7 +14,7 @@ def blocks(root: Path) -> list[str]:
 
 def test_the_example_runs_as_printed(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
     exec(compile(blocks(root)[0], "README.md", "exec"), {})
-    assert re.fullmatch(r"\d+\.\d mm\n", capsys.readouterr().out)
+    assert re.fullmatch(r"its tip rises by \d+\.\d mm\n", capsys.readouterr().out)
 
 
 def test_the_energy_shown_is_the_one_that_ships(root: Path) -> None:

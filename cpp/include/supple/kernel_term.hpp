@@ -52,6 +52,7 @@ class KernelTerm final : public Term {
   std::shared_ptr<const KernelLibrary> library_;
   std::shared_ptr<const Vector> points_;
   Connectivity cells_;
+  Index group_ = 1;  // cells of a batch of colouring_
   Colouring colouring_;
   std::vector<Vector> fields_;  // by field number; "u" stays empty
   mutable Vector constant_;

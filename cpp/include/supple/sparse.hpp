@@ -101,10 +101,12 @@ struct Reduction {
   std::vector<Index> unknown; ///< (dofs) unknown of each dof, −1 where fixed
   CscPattern pattern;         ///< of the reduced matrix
   std::vector<Index> source;  ///< (reduced nonzeros) position in the CSR values
+  Index full_nonzeros = 0;    ///< of the CSR matrix that it is taken from
 
   Index free() const { return static_cast<Index>(dof.size()); }
   /// reduced = the reduced matrix's values, taken from the CSR `values`; no search, no allocation.
   /// Storage::Lower reads the upper triangle of the rows, which holds the same numbers.
+  /// @throws ShapeError if a size does not fit.
   void gather(const ConstVector& values, MutableVector reduced) const;
   /// Entries of the free dofs.
   Vector restrict(const ConstVector& full) const;

@@ -47,11 +47,13 @@ class System {
   const Reduction& reduction();
   /// Factorise the reduced tangent last assembled, plus `shift` times its diagonal's mean size.
   FactorStatus factorise(double shift = 0.0);
+  /// The same without asking it to be positive definite (symmetric kinds only).
+  FactorStatus factorise_indefinite();
   /// x (3n), 0 at fixed dofs, from the last factor; `rhs` (3n).
   Vector solve(const ConstVector& rhs);
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
-  /// Negative eigenvalues of the reduced tangent last assembled (symmetric kinds only).
+  /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only).
   Inertia inertia();
 
   Timings timings;
@@ -62,7 +64,8 @@ class System {
   Mask free_;
   std::unique_ptr<BlockPattern> pattern_;
   std::unique_ptr<Reduction> reduction_;
-  std::unique_ptr<Factor> factor_;
+  std::unique_ptr<Factor> factor_, indefinite_;
+  Factor* current_ = nullptr;  // the one that factorised last
   Vector values_, reduced_;
 };
 

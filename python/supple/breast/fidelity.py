@@ -20,7 +20,7 @@ from supple.breast.facets import (
 )
 from supple.breast.grid import signed_distance, voxel_coordinates
 from supple.breast.region import breast_region
-from supple.breast.surface import signed_volumes
+from supple.breast.surface import mean_ratios, signed_volumes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,13 +78,12 @@ def cell_quality(points: Points, cells: Ints) -> dict[str, float]:
     """Shape of tetrahedra and topology of their body.
 
     Returns:
-        nodes, cells; min_volume_mm3; min_mean_ratio, mean_mean_ratio: 12 (3V)^(2/3) / Σ l², one
-        for a regular cell (Liu & Joe 1994, BIT 34, 268–287); min_dihedral_deg,
+        nodes, cells; min_volume_mm3; min_mean_ratio, mean_mean_ratio; min_dihedral_deg,
         max_dihedral_deg; mean_edge_mm; genus: handles of the surface, summed over its parts.
     """
     volume = signed_volumes(points, cells)
-    squares = np.array([_edge_squares(points, cells, *pair) for pair in combinations(range(4), 2)])
-    ratio = 12.0 * np.cbrt(3.0 * volume.clip(0.0)) ** 2 / squares.sum(axis=0)
+    ratio = mean_ratios(points, cells)
+    ends = [points[cells[:, i]] - points[cells[:, j]] for i, j in combinations(range(4), 2)]
     angles = dihedral_angles(points, cells)
     return {
         "nodes": len(points),
@@ -94,7 +93,7 @@ def cell_quality(points: Points, cells: Ints) -> dict[str, float]:
         "mean_mean_ratio": float(ratio.mean()),
         "min_dihedral_deg": float(angles.min()),
         "max_dihedral_deg": float(angles.max()),
-        "mean_edge_mm": float(np.sqrt(squares).mean()),
+        "mean_edge_mm": float(np.linalg.norm(ends, axis=2).mean()),
         "genus": float(_genus(cells)),
     }
 
@@ -108,10 +107,6 @@ def dihedral_angles(points: Points, cells: Ints) -> Points:
         normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
     cosines = [-np.einsum("ij,ij->i", m, n) for m, n in combinations(normals, 2)]
     return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).T)
-
-
-def _edge_squares(points: Points, cells: Ints, i: int, j: int) -> Points:
-    return np.asarray(((points[cells[:, i]] - points[cells[:, j]]) ** 2).sum(axis=1))
 
 
 def _genus(cells: Ints) -> int:

@@ -35,6 +35,11 @@ class PatientGrid:
         nx, ny, nz = (int(n) + 1 for n in np.ceil((end - start) / spacing))
         return cls(start, spacing, (nz, ny, nx))
 
+    def axes(self) -> tuple[Points, Points, Points]:
+        """x, y and z of the nodes along each axis, mm."""
+        x, y, z = (self.origin[a] + self.spacing * np.arange(self.shape[2 - a]) for a in range(3))
+        return x, y, z
+
     def corners(self) -> Points:
         """(8, 3) mm of the outermost nodes."""
         end = self.origin + self.spacing * (np.array(self.shape[::-1]) - 1)
@@ -73,6 +78,10 @@ class PatientGrid:
     def signed_distance(self, mask: Mask) -> Field:
         """Distance in mm to the faces between nodes in and out of `mask`, negative inside."""
         return np.asarray(_array(signed_distance(self.image(mask.astype(np.uint8)))), np.float32)
+
+    def closing(self, mask: Mask, radius: float) -> Mask:
+        """`mask` and all gaps into which a ball of `radius` mm does not fit."""
+        return np.asarray(self.distance(self.distance(mask) > radius) > radius, bool)
 
     def image(self, array: NDArray[Any]) -> sitk.Image:
         """`array` as an image that knows where it lies."""

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from supple.breast.phantom_anatomy import Array
 from supple.breast.phantom_files import write_case, write_image, write_ply, write_truth
 from supple.breast.phantom_image import BACKING, Scene, chest_distance, draw_image, draw_labels
 from supple.breast.phantom_mesh import Box, Cells, make_box
@@ -49,7 +48,7 @@ class Size:
 
 
 SIZES = {
-    "demo": Size(Cells(4, 12, 4, 4, 12, 5, 5), (1e-3, 1e-3, 2e-3)),
+    "demo": Size(Cells(4, 14, 4, 4, 14, 5, 5), (1e-3, 1e-3, 2e-3)),
     "small": Size(Cells(2, 7, 2, 2, 7, 3, 4), (2e-3, 2e-3, 3e-3), ScanSettings(each=4)),
 }
 
@@ -95,11 +94,13 @@ def make_patient(
         prone.mha, labels.mha, supine.ply, case.toml and truth.json.
 
     Raises:
-        InputError: unknown size.
-        ConvergenceError: no patient of this seed could be solved with a tumour that moves enough.
+        InputError: unknown size or a seed below 0.
+        ConvergenceError: a pose was not solved, or no patient's tumour moves far enough.
     """
     if size not in SIZES:
         raise InputError(f"size must be one of {', '.join(SIZES)}, got {size!r}: choose one.")
+    if seed < 0:
+        raise InputError(f"seed must be at least 0, got {seed}: choose another.")
     drawing, noise = np.random.default_rng(seed).spawn(2)
     solved = solve_patient(drawing, SIZES[size])
     return write_patient(
@@ -145,7 +146,7 @@ def write_patient(
 ) -> PatientFiles:
     """Image and scan a solved patient and write all files; ``origin`` heads truth.json."""
     patient, poses = solved.patient, solved.poses
-    scene = view_prone(solved, size)
+    scene = view_prone(solved, field_of_view(poses, size))
     labels = draw_labels(scene)
     image = draw_image(scene, labels, rng)
     scan = misaligned(make_scan(poses.box, poses.supine, rng, size.scan), patient)
@@ -161,10 +162,9 @@ def write_patient(
     return files
 
 
-def view_prone(solved: Solved, size: Size) -> Scene:
+def view_prone(solved: Solved, grid: Grid) -> Scene:
     """The prone patient in front of the scanner, in the thorax's frame."""
     box, prone = solved.poses.box, solved.poses.prone
-    grid = _grid(prone[box.skin], np.array(size.spacing))
     torso = solved.patient.anatomy.torso
     inward = -BACKING * torso.normal(np.meshgrid(*box.axes[:2], indexing="ij")[0])
     body = voxelise(grid, *box.backed(prone, inward), sample_skin(box, prone, 10))
@@ -177,8 +177,9 @@ def misaligned(scan: Scan, patient: Patient) -> Scan:
     return Scan(patient.misalignment.apply(scan.points + patient.isocentre), scan.triangles)
 
 
-def _grid(skin: Array, spacing: Array) -> Grid:
-    """The field of view: the torso's width, the front down to behind the thorax's axis."""
+def field_of_view(poses: Poses, size: Size) -> Grid:
+    """The image's grid: the torso's width, the front down to behind the thorax's axis."""
+    skin, spacing = poses.prone[poses.box.skin], np.array(size.spacing)
     low = np.array([skin[..., 0].min() - _AIR, skin[..., 1].min() - _AIR, _LEVELS[0]])
     high = np.array([skin[..., 0].max() + _AIR, _BEHIND, _LEVELS[1]])
     x, y, z = (np.floor((high - low) / spacing)).astype(int) + 1

@@ -1,12 +1,6 @@
 """Which voxels make the finite-element body: both breasts on their chest wall.
 
-    labels ─► height above the chest wall ─► breasts proper ─► reach ─► no thin sheet, no island
-
-The *height* of a point is its distance to the chest wall, its *foot* the nearest point there. What
-stands higher than a share of the highest point on its side of the body is the breast proper; the
-body is all breast tissue whose foot lies within a *reach* of the feet of the breasts proper. The
-fat that wraps around the torso, below the clavicle and on the abdomen is lower than that, so the
-cuts follow the breasts themselves, stand upright on the chest wall and need no landmark.
+labels ─► breast tissue within reach of the breasts ─► no thin sheet, no crevice, no island
 """
 
 from __future__ import annotations
@@ -18,7 +12,8 @@ import numpy as np
 import SimpleITK as sitk
 from scipy import ndimage
 
-from supple.breast.grid import FAR, PatientGrid, corners, signed_distance, voxel_coordinates
+from supple.breast.grid import FAR, PatientGrid, signed_distance, voxel_coordinates
+from supple.breast.reach import RegionSettings, reach
 from supple.breast.tissues import BREAST, Tissue
 from supple.errors import InputError
 
@@ -31,33 +26,6 @@ if TYPE_CHECKING:
 
 #: Values of `BreastRegion.contact` beside those of Tissue.
 CUT, BODY = 255, 254
-
-
-@dataclass(frozen=True)
-class RegionSettings:
-    """Lengths in mm, shares of the greatest height above the chest wall.
-
-    Attributes:
-        coarse, fine: spacings of the grids that find the breasts and that hold the body.
-        core_share: what stands higher than this share of its side's height is breast proper.
-        least_share: a side lower than this share of the other one carries no breast.
-        least_height: tissue lower than this holds no breast at all.
-        reach_share, least_reach: how far the body goes on beyond the breasts' feet.
-        sheet: fat thinner than this is left out.
-        bridge: holes and notches narrower than this in what is left are filled again.
-        least_part: a part smaller than this share of the largest one is an island, and dropped.
-    """
-
-    coarse: float = 3.0
-    fine: float = 1.5
-    core_share: float = 0.4
-    least_share: float = 0.4
-    least_height: float = 15.0
-    reach_share: float = 0.3
-    least_reach: float = 20.0
-    sheet: float = 4.0
-    bridge: float = 16.0
-    least_part: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -104,7 +72,7 @@ def breast_region(
     """
     s = settings or RegionSettings()
     check_labels(labels)
-    coarse, beyond, within, sides = _reach(labels, s, tumour_mm)
+    coarse, beyond, within, sides = reach(labels, s, tumour_mm)
     box = coarse.points(within)
     grid = PatientGrid.around(box.min(axis=0) - 9.0, box.max(axis=0) + 9.0, s.fine)
     tissue = _breast_tissue(labels, grid)
@@ -145,63 +113,6 @@ def check_labels(labels: sitk.Image) -> None:
         )
 
 
-def _reach(
-    labels: sitk.Image, s: RegionSettings, tumour_mm: Sequence[float] | None
-) -> tuple[PatientGrid, Field, Mask, tuple[str, ...]]:
-    """Coarse grid, how far beyond reach its nodes lie (mm, < 0 within), tissue within, notes."""
-    grid = PatientGrid.around(*corners(labels), s.coarse)
-    codes = grid.resample(labels, sitk.sitkNearestNeighbor, Tissue.AIR)
-    tissue, chest = np.isin(codes, BREAST), codes == Tissue.CHEST
-    height = np.where(tissue, grid.distance(chest), 0.0)
-    foot = ndimage.distance_transform_edt(~chest, return_distances=False, return_indices=True)
-    beyond = np.full(grid.shape, FAR, np.float32)
-    breasts, warnings = _breasts_proper(grid, height, chest, s)
-    for core, top in breasts:
-        reach = max(s.least_reach, s.reach_share * top)
-        beyond = np.minimum(beyond, _from_feet(grid, foot, core) - reach)
-    if tumour_mm is not None:
-        at_tumour = np.zeros(grid.shape, bool)
-        at_tumour[grid.nodes_at([tumour_mm])] = True
-        beyond = np.minimum(beyond, _from_feet(grid, foot, at_tumour & tissue) - s.least_reach)
-    beyond = ndimage.gaussian_filter(beyond.clip(-30.0, 30.0), 1.0)
-    return grid, beyond, tissue & (beyond < 0), warnings
-
-
-def _breasts_proper(
-    grid: PatientGrid, height: NDArray[Any], chest: Mask, s: RegionSettings
-) -> tuple[list[tuple[Mask, float]], tuple[str, ...]]:
-    """For each side that carries a breast: what stands high on it, its height in mm; and notes."""
-    middle = float(np.median(grid.points(chest)[:, 0]))
-    x = grid.origin[0] + grid.spacing * np.arange(grid.shape[2])
-    sides = [np.broadcast_to(side, grid.shape) for side in (x <= middle, x > middle)]
-    tops = [float(height[side].max(initial=0.0)) for side in sides]
-    if max(tops) < s.least_height:
-        raise InputError(
-            f"labels must hold a breast, got tissue no higher than {max(tops):.0f} mm above the"
-            f" chest wall where at least {s.least_height:.0f} mm is expected: check the"
-            " segmentation and that the patient lies prone."
-        )
-    carry = [top >= s.least_share * max(tops) for top in tops]
-    breasts = [
-        (side & (height > s.core_share * top), top)
-        for side, top, breast in zip(sides, tops, carry, strict=True)
-        if breast
-    ]
-    missing = tuple(
-        f"The {name} side carries no breast: its tissue is only {top:.0f} mm high."
-        for name, top, breast in zip(("right", "left"), tops, carry, strict=True)
-        if not breast
-    )
-    return breasts, missing
-
-
-def _from_feet(grid: PatientGrid, foot: NDArray[Any], nodes: Mask) -> Field:
-    """Distance of each node's foot to the nearest foot of `nodes`, mm."""
-    feet = np.zeros(grid.shape, bool)
-    feet[tuple(foot[:, nodes])] = True
-    return np.asarray(grid.distance(feet)[tuple(foot)], np.float32)
-
-
 def _breast_tissue(labels: sitk.Image, grid: PatientGrid) -> sitk.Image:
     """1 where a voxel is fat, gland or tumour; cropped to the box of `grid`, padded by zeros."""
     index = voxel_coordinates(labels, grid.corners())
@@ -225,11 +136,11 @@ def _contact(codes: NDArray[Any], beyond: Field) -> NDArray[np.uint8]:
 
 
 def _solid(grid: PatientGrid, level: Field, beyond: Field, s: RegionSettings) -> Mask:
-    """Nodes of the body: no thin sheet, no ragged hole, no cavity, no island."""
+    """Nodes of the body: no thin sheet, no ragged hole, no crevice, no cavity, no island."""
     inside = (level < 0) & (beyond < 0)
     thick = inside & (grid.distance(level < -s.sheet / 2) < (s.sheet + grid.spacing) / 2)
-    closed = grid.distance(grid.distance(thick) > s.bridge / 2) > s.bridge / 2
-    solid = ndimage.binary_fill_holes(inside & (thick | closed))
+    smooth = inside & (thick | grid.closing(thick, s.bridge / 2))
+    solid = ndimage.binary_fill_holes(smooth | (grid.closing(smooth, s.crevice / 2) & (beyond < 0)))
     names, count = ndimage.label(solid)
     sizes = np.bincount(names.ravel(), minlength=count + 1)
     sizes[0] = 0
@@ -242,9 +153,13 @@ def _solid(grid: PatientGrid, level: Field, beyond: Field, s: RegionSettings) ->
 
 
 def _trim(grid: PatientGrid, level: Field, solid: Mask) -> Field:
-    """`level` of the tissue, cut down to the nodes of `solid`, whose cavities count as inside."""
+    """`level` of the tissue without what is not `solid`, and with the gaps that `solid` fills.
+
+    Trimming starts one node off the solid, so that it leaves the tissue's own surface as it is.
+    """
     nodes = grid.signed_distance(solid)
-    return np.where(solid & (level > 0), nodes, np.maximum(level, nodes)).astype(np.float32)
+    trimmed = np.maximum(level, nodes - grid.spacing)
+    return np.where(solid & (level > 0), np.minimum(level, nodes), trimmed).astype(np.float32)
 
 
 def _voxels_below(field: sitk.Image, voxels: sitk.Image) -> sitk.Image:
@@ -256,7 +171,7 @@ def _voxels_below(field: sitk.Image, voxels: sitk.Image) -> sitk.Image:
 
 def _volume_mm3(mask: sitk.Image) -> float:
     count = np.count_nonzero(sitk.GetArrayViewFromImage(mask))
-    return float(np.prod(mask.GetSpacing())) * count
+    return float(np.prod(mask.GetSpacing()) * count)
 
 
 def _border_warning(labels: sitk.Image, mask: sitk.Image) -> tuple[str, ...]:

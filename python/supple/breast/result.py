@@ -28,7 +28,7 @@ class SkinPoint:
     def on(self, points: ArrayLike, triangles: ArrayLike) -> Array:
         """Its place (3,) on the moved skin: points (n, 3), triangles (t, 3)."""
         corners = np.asarray(points, dtype=float)[np.asarray(triangles)[self.triangle]]
-        return np.asarray(self.weights) @ corners
+        return np.asarray(np.asarray(self.weights) @ corners)
 
 
 def closest_on_skin(
@@ -81,7 +81,7 @@ def _edges(p: Array, a: Array, b: Array, c: Array) -> list[Array]:
 
 
 def breast_side(point: ArrayLike, midline_x: float = 0.0) -> str:
-    """ "left" or "right" breast of the patient: +x is the patient's left of ``midline_x``."""
+    """Which breast of the patient, "left" or "right": +x is the patient's left of ``midline_x``."""
     return "left" if float(np.asarray(point, dtype=float)[0]) > midline_x else "right"
 
 

@@ -7,6 +7,7 @@ volume again. The zero of that field is the surface.
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,14 +57,14 @@ def fit_to_level(
     """`points` (n, 3) mm with the boundary nodes moved onto the zero of `level`.
 
     Flat facets cut the corners of a round body, so the nodes are moved on by the same small
-    distance everywhere until the mesh holds `volume_mm3`. A move that would squeeze a cell to
-    less than a third of its volume is shortened, then left out.
+    distance everywhere until the mesh holds `volume_mm3`. Where a move would spoil a cell's shape
+    it is shortened, then left out.
     """
     facets = boundary_facets(cells)
     nodes = np.unique(facets)
     slopes = grid.gradient(level)
     offset = 0.0
-    for _ in range(6):
+    for _ in range(8):
         at = points[nodes]
         slope = np.stack([grid.sample(s, at) for s in slopes], axis=1)
         steep = np.maximum(np.einsum("ij,ij->i", slope, slope), 0.25)
@@ -79,16 +80,29 @@ def _limited(step: Points, longest: float) -> Points:
     return np.asarray(step * np.minimum(1.0, longest / np.maximum(length, 1e-12)))
 
 
-def _move(points: Points, cells: Cells, nodes: NDArray[np.int32], step: Points) -> Points:
-    before = signed_volumes(points, cells)
-    for share in (1.0, 0.4, 0.4, 0.4, 0.0):
+def _move(
+    points: Points, cells: Cells, nodes: NDArray[np.int32], step: Points, good: float = 0.3
+) -> Points:
+    """`points` with `nodes` moved, no cell's mean ratio falling under `good` or further below."""
+    least = np.minimum(mean_ratios(points, cells), good)
+    for share in (0.5, 0.5, 0.5, 0.0, 0.0, 0.0):
         moved = points.copy()
         moved[nodes] += step
-        squeezed = signed_volumes(moved, cells) < before / 3
-        if not squeezed.any():
+        spoilt = mean_ratios(moved, cells) < least
+        if not spoilt.any():
             return moved
-        step[np.isin(nodes, cells[squeezed])] *= share
+        step[np.isin(nodes, cells[spoilt])] *= share
     return points
+
+
+def mean_ratios(points: Points, cells: Cells) -> Points:
+    """(c,) 12 (3V)^(2/3) / Σ l² of tetrahedra: 1 for a regular one, 0 for a flat or inverted one.
+
+    Source: Liu & Joe (1994), BIT 34, 268–287.
+    """
+    ends = [points[cells[:, i]] - points[cells[:, j]] for i, j in combinations(range(4), 2)]
+    squares = sum((np.einsum("ij,ij->i", e, e) for e in ends), np.zeros(len(cells)))
+    return np.asarray(12.0 * np.cbrt(3.0 * signed_volumes(points, cells).clip(0.0)) ** 2 / squares)
 
 
 def signed_volumes(points: Points, cells: Cells) -> Points:

@@ -73,16 +73,19 @@ class MeshSettings:
 
     Attributes:
         smoothing: standard deviation of the Gaussian that takes the voxels' steps off.
-        lattice: edge of the boxes of the lattice that the surface is cut from.
+        cells: how many to aim at where no edge_mm is given, and the bounds of `edge` then.
+        lattice: boxes per edge in the lattice that the surface is cut from.
         chord: how far a facet may lie off the surface.
         gradation: ratio of the lengths of neighbouring edges.
         across_tumour: edges per diameter of the tumour.
         least_part: a part with fewer cells than this share of the largest one's is dropped.
     """
 
-    smoothing: float = 1.5
-    lattice: float = 5.0
-    chord: float = 1.0
+    smoothing: float = 2.0
+    cells: int = 12000
+    edge: tuple[float, float] = (10.0, 25.0)
+    lattice: float = 3.0
+    chord: float = 1.5
     gradation: float = 1.5
     across_tumour: float = 3.0
     least_part: float = 0.05
@@ -91,7 +94,7 @@ class MeshSettings:
 def build_mesh(
     labels: sitk.Image,
     *,
-    edge_mm: float = 14.0,
+    edge_mm: float | None = None,
     tumour_mm: Sequence[float] | None = None,
     tumour_diameter_mm: float | None = None,
     settings: MeshSettings | None = None,
@@ -101,7 +104,7 @@ def build_mesh(
     Args:
         labels: 3-D image of `Tissue` codes, LPS mm, any direction cosines.
         edge_mm: longest edge that the mesher aims at; edges are shorter where skin is curved
-            and around the tumour.
+            and around the tumour. None: what some 12,000 cells need.
         tumour_mm: the tumour's centre, LPS mm.
         tumour_diameter_mm: cells within this sphere become TUMOUR, whatever their label.
         settings: smoothing and accuracy.
@@ -113,24 +116,50 @@ def build_mesh(
     """
     s = settings or MeshSettings()
     _check_lengths(edge_mm=edge_mm, tumour_diameter_mm=tumour_diameter_mm)
+    _check_point(tumour_mm)
     region = breast_region(labels, tumour_mm=tumour_mm)
     tumour = _tumour(region, tumour_mm, tumour_diameter_mm)
-    level = smooth_level(region, s.smoothing)
-    points, cells = cut_lattice(region.grid, level, s.lattice)
-    points, cells, parts = largest_parts(points, cells, s.least_part)
-    edges = _edges(points, edge_mm, tumour, s)
-    points, cells = remesh(points, cells, edges, gradation=s.gradation, chord=s.chord)
-    points = fit_to_level(region.grid, level, points, cells, region.volume_mm3)
-    edges = _edges(points, edge_mm, tumour, s)
-    points, cells = remesh(points, cells, edges, gradation=s.gradation, chord=None)
-    _check_mesh(points, cells)
+    edge = edge_mm or _edge_for(region, s)
+    points, cells, parts = _body(region, edge, tumour, s)
     return _assemble(region, points, cells, _tissues(labels, points, cells, tumour), parts)
+
+
+def _edge_for(region: BreastRegion, s: MeshSettings) -> float:
+    """Longest edge, mm, that gives roughly `s.cells` cells; measured on bodies of 1 to 6 litres."""
+    litres = region.volume_mm3 / 1e6
+    return float(np.clip(16.0 * litres**0.4 * np.sqrt(12000.0 / s.cells), *s.edge))
+
+
+def _body(
+    region: BreastRegion, edge: float, tumour: _Tumour | None, s: MeshSettings
+) -> tuple[Points, Ints, int]:
+    """Nodes in mm, cells, number of parts; tried again, smoother, where the mesher gives up."""
+    for attempt in (1.0, 1.25, 1.5, 1.75):
+        try:
+            level = smooth_level(region, attempt * s.smoothing)
+            points, cells = cut_lattice(region.grid, level, edge / s.lattice / np.sqrt(attempt))
+            points, cells, parts = largest_parts(points, cells, s.least_part)
+            for chord in (s.chord, s.chord, None):
+                edges = _edges(points, edge, tumour, s)
+                points, cells = remesh(points, cells, edges, gradation=s.gradation, chord=chord)
+                if chord is not None:
+                    points = fit_to_level(region.grid, level, points, cells, region.volume_mm3)
+            _check_mesh(points, cells)
+            return points, cells, parts
+        except MeshError as error:
+            failure = error
+    raise failure
 
 
 def _check_lengths(**lengths: float | None) -> None:
     for name, value in lengths.items():
         if value is not None and not 0.0 < value < np.inf:
             raise InputError(f"{name} must be a positive length in mm, got {value}: correct it.")
+
+
+def _check_point(centre: Sequence[float] | None) -> None:
+    if centre is not None and (len(centre) != 3 or not np.isfinite(centre).all()):
+        raise InputError(f"tumour_mm must be x, y, z in LPS mm, got {centre}: give three numbers.")
 
 
 @dataclass(frozen=True)
@@ -145,13 +174,11 @@ def _tumour(
     """The tumour as a ball, None where its centre or its size is not known.
 
     Raises:
-        InputError: its centre is not three finite numbers, or lies outside of the body.
+        InputError: its centre lies outside of the body.
     """
     if centre is None:
         return None
     point = np.asarray(centre, float)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise InputError(f"tumour_mm must be x, y, z in LPS mm, got {centre}: give three numbers.")
     inside = region.grid.points(region.level < 0)
     away = float(np.linalg.norm(inside - point, axis=1).min())
     if away > region.grid.spacing:

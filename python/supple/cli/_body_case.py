@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .. import Body, Mesh
+from .. import Body, Mesh, material
 from ..errors import InputError
 from . import _where
 
@@ -36,7 +36,7 @@ def read_body(case: Table, *, allow_energy_files: bool) -> tuple[Body, dict[str,
     body = _material(case, mesh, allow_energy_files)
     for table in case.tables("region"):
         chosen = _where.cells(table, mesh)
-        law, parameters = _law(table, allow_energy_files), table.remaining()
+        law, parameters = _law(table, allow_energy_files)
         with table.named():
             body.region(chosen, law, **parameters)
     _supports_and_loads(case, body, mesh)
@@ -73,23 +73,25 @@ def _optional(table: Table, key: str) -> str | None:
 
 def _material(case: Table, mesh: Mesh, allow_energy_files: bool) -> Body:
     table = case.required("material")
-    law = _law(table, allow_energy_files)
-    density, parameters = table.number("density", 0.0), table.remaining()
+    density = table.number("density", 0.0)
+    law, parameters = _law(table, allow_energy_files)
     with table.named():
         return Body(mesh, law, density=density, **parameters)
 
 
-def _law(table: Table, allow_energy_files: bool) -> str:
-    """The name of a shipped energy, or the path of an energy file if those are allowed."""
+def _law(table: Table, allow_energy_files: bool) -> tuple[str, dict[str, Any]]:
+    """An energy's name (or file, if those are allowed) and its parameters; the table ends here."""
     law = table.text("law")
-    if not (law.endswith(".py") or "/" in law or "\\" in law):
-        return law
-    if not allow_energy_files:
-        raise InputError(
-            f"{table.at('law')} names an energy file, {law}, which would be compiled and run; "
-            "read it, then allow it with --allow-energy-files."
-        )
-    return str(table.path("law"))
+    if law.endswith(".py"):
+        if not allow_energy_files:
+            raise InputError(
+                f"{table.at('law')} names an energy file, {law}, which would be compiled and run; "
+                "read it, then allow it with --allow-energy-files."
+            )
+        law = str(table.path("law"))
+    with table.named("law"):
+        known = [parameter.name for parameter in material(law).parameters]
+    return law, table.numbers(known)
 
 
 def _supports_and_loads(case: Table, body: Body, mesh: Mesh) -> None:
@@ -117,8 +119,8 @@ def _skin(case: Table, body: Body, mesh: Mesh, allow_energy_files: bool) -> None
     table = case.table("skin")
     if table is None:
         return
-    chosen, law = _where.nodes(table, mesh), _law(table, allow_energy_files)
-    thickness, parameters = table.number("thickness", 2e-3, above=0.0), table.remaining()
+    chosen, thickness = _where.nodes(table, mesh), table.number("thickness", 2e-3, above=0.0)
+    law, parameters = _law(table, allow_energy_files)
     with table.named():
         body.skin(chosen, law, thickness=thickness, **parameters)
 

@@ -11,6 +11,7 @@ from types import FrameType
 
 import click
 
+from .. import __version__
 from ..errors import SuppleError
 from ._errors import exit_code, report
 
@@ -40,9 +41,7 @@ class CommandFiles(click.Group):
 def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
-    from importlib.metadata import version
-
-    click.echo(f"supple {version('supple')}")
+    click.echo(f"supple {__version__}")
     ctx.exit()
 
 

@@ -181,7 +181,7 @@ class Search:
         patch = np.unique(key, axis=0, return_inverse=True)[1].ravel()
         total = np.bincount(patch, weight[use])
         columns = np.column_stack([rows[use], residual[use]])
-        mean = np.stack([np.bincount(patch, weight[use] * c) for c in columns.T], 1)
+        mean: Array = np.stack([np.bincount(patch, weight[use] * c) for c in columns.T], 1)
         share = np.minimum(total / (0.5 * np.median(total)), 1.0)
         mean = mean * (np.sqrt(share) / total)[:, None]
         free = max(float(share.sum()) - 6.0, 1.0)

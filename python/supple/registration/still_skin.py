@@ -72,10 +72,13 @@ class Chest:
         origin = np.median(points, axis=0)
         basis, height = _basis(points - origin), -points[:, 1]
         weight = np.ones(len(points))
-        fit = np.zeros(basis.shape[1])
+        fit: Array = np.zeros(basis.shape[1])
         for _ in range(rounds):
             root = np.sqrt(weight)
-            fit = np.linalg.lstsq(basis * root[:, None], height * root, rcond=None)[0]
+            fit = np.asarray(
+                np.linalg.lstsq(basis * root[:, None], height * root, rcond=None)[0],
+                dtype=np.float64,
+            )
             weight = 1.0 / (1.0 + (np.maximum(height - basis @ fit, 0.0) / 3e-3) ** 2)
         return cls(origin, fit)
 

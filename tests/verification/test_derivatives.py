@@ -1,0 +1,122 @@
+"""Every energy on every element: energy → residual → tangent by central differences, at rest zero."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import supple
+
+ELEMENTS = ("P1", "P2", "Q1", "Q2")
+LAWS = [material.name for material in supple.materials()]
+#: Laws whose kernels are compiled with Supple, so that every element × form is quick.
+AHEAD = ("neo_hookean", "corotational_polar")
+
+
+def units(*forms: str) -> list:
+    """law.element.form; slow where it takes long to compile."""
+    chosen = []
+    for law in LAWS:
+        for element in ELEMENTS:
+            for form in forms:
+                quick = form == "direct" or law != "corotational_qr"
+                fast = law in AHEAD or (element in ("P1", "Q1") and quick)
+                marks = () if fast else (pytest.mark.slow,)
+                chosen.append(pytest.param(f"{law}.{element}.{form}", marks=marks))
+    return chosen
+
+
+@pytest.fixture
+def system(unit, compiled_units, distorted):
+    """system(unit): the runtime system of a distorted block with other parameters in each cell."""
+    law, element, form = unit.split(".")
+    mesh = distorted(element, (2, 1, 1))
+    body = supple.Body(mesh, law)
+    spread = np.linspace(0.8, 1.25, len(mesh.cells))
+    body.set(**{p.name: p.default * spread for p in supple.material(law).parameters})
+    return body._system(form == "inverse").system
+
+
+def stretched(points, seed=1):
+    """A displacement of some 20 % strain, not affine."""
+    rng = np.random.default_rng(seed)
+    A = np.array([[0.15, 0.1, -0.05], [0.0, -0.1, 0.1], [0.05, 0.0, 0.12]])
+    return (points @ A.T + 0.03 * rng.uniform(-1, 1, points.shape)).ravel()
+
+
+def dense(system, u):
+    """The tangent (3n, 3n)."""
+    from scipy.sparse import csr_array
+
+    return csr_array(system.tangent(u), shape=(u.size, u.size))
+
+
+def points_of(unit, distorted):
+    return distorted(unit.split(".")[1], (2, 1, 1)).points
+
+
+def direction(size):
+    return np.random.default_rng(2).uniform(-1, 1, size)
+
+
+@pytest.mark.parametrize("unit", units("direct"))
+def test_residual_is_the_derivative_of_the_energy(unit, system, distorted, assert_slope):
+    """R·d against central differences of Π, at some 20 % strain."""
+    u = stretched(points_of(unit, distorted))
+    d = direction(u.size)
+    slope = system.residual(u, 1.0) @ d
+    assert_slope(lambda x: system.energy(x, 1.0), slope, u, d, 2e-3)
+
+
+@pytest.mark.parametrize("unit", units("direct", "inverse"))
+def test_tangent_is_the_derivative_of_the_residual(unit, system, distorted, assert_slope):
+    """K d against central differences of R, at some 20 % strain."""
+    u = stretched(points_of(unit, distorted))
+    d = direction(u.size)
+    slope = dense(system, u) @ d
+    assert_slope(lambda x: system.residual(x, 1.0), slope, u, d, 2e-3)
+
+
+@pytest.mark.parametrize("unit", units("direct"))
+def test_tangent_is_symmetric(unit, system, distorted):
+    """A second derivative of the energy is."""
+    K = dense(system, stretched(points_of(unit, distorted)))
+    assert abs(K - K.T).max() < 1e-13 * abs(K).max()
+
+
+@pytest.mark.parametrize("unit", units("direct", "inverse"))
+def test_a_rigid_motion_gives_no_force(unit, system, distorted, rotation):
+    """u = (Q - I) x + c: residual below 1e-12 of the stiffness times the body's size."""
+    points = points_of(unit, distorted)
+    for u in (np.zeros(points.size), (points @ rotation.T - points + [0.3, -0.2, 0.1]).ravel()):
+        stiffness = abs(dense(system, u)).max()
+        assert abs(system.residual(u, 1.0)).max() < 1e-12 * stiffness
+    if unit.endswith("direct"):
+        assert abs(system.energy(u, 1.0)) < 1e-12 * stiffness
+
+
+@pytest.mark.parametrize("unit", units("direct"))
+def test_a_free_cell_has_six_zero_modes(unit, compiled_units):
+    """Three shifts and three turns, and nothing else, cost no energy at rest."""
+    law, element, _ = unit.split(".")
+    box = supple.Mesh.box((1, 1, 1), (1.0, 1.0, 1.0), element)
+    nodes = np.unique(box.cells[0])
+    cell = supple.Mesh(box.points[nodes], np.searchsorted(nodes, box.cells[:1]), element)
+    u = np.zeros_like(cell.points)
+    eigenvalues = np.linalg.eigvalsh(supple.assemble(supple.Body(cell, law), u)[2].toarray())
+    scaled = eigenvalues / eigenvalues.max()
+    assert np.abs(scaled[:6]).max() < 1e-13, scaled[:7]
+    assert scaled[6] > 1e-4, scaled[:7]
+
+
+@pytest.mark.parametrize("unit", units("inverse"))
+def test_inverse_residual_is_the_direct_one_read_backwards(unit, compiled_units, distorted):
+    """On the loaded mesh, u' = X - x gives the very nodal forces that u = x - X gives on the rest."""
+    law, element, _ = unit.split(".")
+    rest = distorted(element, (2, 1, 1))
+    u = stretched(rest.points).reshape(-1, 3)
+    body = supple.Body(rest, law)
+    direct = supple.assemble(body, u)[1]
+    inverse = body.on(rest.moved(rest.points + u))._system(True).system
+    backwards = inverse.residual(-u.ravel(), 1.0).reshape(-1, 3)
+    np.testing.assert_allclose(backwards, direct, atol=1e-12 * abs(direct).max(), rtol=0)

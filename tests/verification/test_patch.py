@@ -1,0 +1,68 @@
+"""Patch tests: linear fields and volumes on distorted meshes, quadratics on affine cells of degree 2."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import supple
+from supple.kernels.cells import ELEMENTS
+
+A = np.array([[0.2, 0.1, -0.05], [0.0, -0.15, 0.1], [0.05, 0.0, 0.25]])
+F = np.eye(3) + A
+
+
+#: The 4 points of P2 integrate straight-edged cells exactly, those of Q2 curved ones too; a curved
+#: P2 cell needs degree 3, two of its area vectors times one of its gradients.
+CASES = [
+    *(pytest.param(e, e != "P2", None, id=e) for e in ELEMENTS),
+    pytest.param("P2", True, 3, id="P2 curved", marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize("law", ["neo_hookean", "corotational_polar"])
+@pytest.mark.parametrize(("element", "curved", "degree"), CASES)
+def test_linear_field_on_the_boundary_gives_it_inside(element, curved, degree, law, distorted):
+    """u = A x on the boundary of a distorted mesh: the same within, F = I + A everywhere."""
+    mesh = distorted(element, (3, 3, 3), curved)
+    outside = np.unique(mesh.boundary())
+    assert len(outside) < len(mesh.points)
+    body = supple.Body(mesh, law, quadrature=degree).prescribe(outside, mesh.points[outside] @ A.T)
+    state = body.solve()
+    np.testing.assert_allclose(state.u, mesh.points @ A.T, atol=1e-12)
+    found = state.deformation_gradient(at="quadrature")
+    np.testing.assert_allclose(found, np.broadcast_to(F, found.shape), atol=1e-11)
+
+
+@pytest.mark.parametrize(("element", "curved", "degree"), CASES)
+def test_volume_of_a_linear_field_is_exact(element, curved, degree, distorted):
+    """∫ J dV = det F times the volume at rest = the volume of the moved mesh."""
+    mesh = distorted(element, (2, 2, 2), curved)
+    body = supple.Body(mesh, "neo_hookean", quadrature=degree).prescribe(lambda p: p[:, 0] > -9, mesh.points @ A.T)
+    state = body.solve()
+    J = np.linalg.det(state.deformation_gradient(at="quadrature"))
+    volume = (J * state._values.volume).sum()
+    assert volume == pytest.approx(np.linalg.det(F) * mesh.volume, rel=1e-12)
+    assert mesh.moved(state.points).volume == pytest.approx(volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("element", ["P2", "Q2"])
+def test_quadratic_field_is_exact_on_affine_cells(element):
+    """F of a full quadratic u at the quadrature points of a sheared box, against its gradient."""
+    from supple.kernels.elements import STIFFNESS_DEGREE, quadrature
+
+    box = supple.Mesh.box((2, 2, 1), (1.0, 0.8, 0.5), element)
+    mesh = box.moved(box.points @ np.array([[1, 0.3, 0], [0, 1, 0.2], [0.1, 0, 1.0]]).T)
+    B = 0.1 * np.random.default_rng(0).uniform(-1, 1, (3, 3, 3))
+    B = B + B.transpose(0, 2, 1)
+    u = np.einsum("ijk,nj,nk->ni", B, mesh.points, mesh.points)
+    body = supple.Body(mesh, "neo_hookean")
+    table = body._system().regions[0].tabulate("points", u.ravel())
+    found = table.reshape(len(mesh.cells), -1, 20)[:, :, :9].reshape(len(mesh.cells), -1, 3, 3)
+    places, _ = quadrature(element, STIFFNESS_DEGREE[element])
+    first, along = mesh.table.from_vtk[0], mesh.table.from_vtk[[1, 2, 4 if element == "Q2" else 3]]
+    corners = mesh.points[mesh.cells]
+    edges = corners[:, along] - corners[:, [first]]
+    at = corners[:, [first]] + np.einsum("qd,cdi->cqi", places, edges)
+    expected = np.eye(3) + 2 * np.einsum("ijk,cqk->cqij", B, at)
+    np.testing.assert_allclose(found, expected, atol=1e-13)
