@@ -26,9 +26,11 @@ from . import reader
 from .unit import Unit
 
 FLAGS = (
-    "-std=c17", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math",
+    "-std=c17", "-march=native", "-fno-math-errno", "-fno-trapping-math",
     "-fno-signed-zeros", "-ffp-contract=fast", "-fPIC", "-shared", "-fvisibility=hidden",
 )  # fmt: skip
+#: Above this many characters of C, GCC's time grows faster than what -O3 gains.
+_LARGE = 700_000
 #: Seconds after which an unfinished compilation's folder counts as abandoned.
 _ABANDONED = 3600.0
 
@@ -132,8 +134,10 @@ def _compile(unit: Unit, contract: str, cached: Path) -> None:
     _sweep(cached.parent)
     aside = Path(tempfile.mkdtemp(prefix=".compiling-", dir=cached.parent))
     try:
-        (aside / "kernels.c").write_text(source(unit, contract), encoding="utf-8")
-        command = [compiler, *FLAGS, "kernels.c", "-o", "kernels.so", "-lm"]
+        text = source(unit, contract)
+        (aside / "kernels.c").write_text(text, encoding="utf-8")
+        level = "-O1" if len(text) > _LARGE else "-O3"
+        command = [compiler, level, *FLAGS, "kernels.c", "-o", "kernels.so", "-lm"]
         done = subprocess.run(command, cwd=aside, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise BuildError(f"{compiler} could not compile {unit.name}: {done.stderr.strip()[:500]}")

@@ -37,7 +37,8 @@ py::tuple tangent(supple::System& system, const Vector& u) {
 void bind_terms(py::module_& module) {
   py::class_<supple::VolumeRatio>(module, "VolumeRatio")
       .def_readonly("value", &supple::VolumeRatio::value)
-      .def_readonly("cell", &supple::VolumeRatio::cell);
+      .def_readonly("cell", &supple::VolumeRatio::cell)
+      .def_readonly("term", &supple::VolumeRatio::term);
   py::class_<supple::Term, std::shared_ptr<supple::Term>>(module, "Term")
       .def_readwrite("is_load", &supple::Term::is_load)
       .def("energy", &supple::Term::energy)

@@ -187,7 +187,7 @@ VolumeRatio KernelTerm::volume_ratio(const ConstVector& u) const {
     for (Index lane = 0; lane < count; ++lane) {
       for (int p = 0; p < volume_ratio_->rows; ++p) {
         const double J = A[p * lanes + lane];
-        if (!(J >= w.value)) w = {std::isnan(J) ? -INFINITY : J, first + lane};
+        if (!(J >= w.value)) w = {std::isnan(J) ? -INFINITY : J, first + lane, 0};
       }
     }
   });

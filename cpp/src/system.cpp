@@ -80,9 +80,9 @@ Vector System::external(const ConstVector& u) const {
 
 VolumeRatio System::volume_ratio(const ConstVector& u) const {
   VolumeRatio smallest;
-  for (const auto& term : terms_) {
-    const VolumeRatio ratio = term->volume_ratio(u);
-    if (ratio.value < smallest.value) smallest = ratio;
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    const VolumeRatio ratio = terms_[t]->volume_ratio(u);
+    if (ratio.value < smallest.value) smallest = {ratio.value, ratio.cell, static_cast<Index>(t)};
   }
   return smallest;
 }

@@ -96,12 +96,14 @@ class Body:
     def set(self, where: Where | None = None, **values: Any) -> Body:
         """New parameters, scalars or one a chosen cell (all cells if ``where`` is None)."""
         chosen = np.arange(len(self.mesh.cells)) if where is None else self.mesh.cell_ids(where)
-        touched = [r for r in self._description.regions if np.isin(r.ids, chosen).any()]
-        for region in touched:
+        changes = []  # all checked before the first is made
+        for region in self._description.regions:
             inside = np.isin(region.ids, chosen)
-            rows = np.searchsorted(chosen, region.ids[inside])
-            mine = {n: v if np.ndim(v) == 0 else np.asarray(v)[rows] for n, v in values.items()}
-            new = parameters.given(region.law, mine, int(inside.sum()))
+            if inside.any():
+                new = parameters.given(region.law, values, len(chosen))
+                rows = np.searchsorted(chosen, region.ids[inside])
+                changes.append((region, inside, {n: v[rows] for n, v in new.items()}))
+        for region, inside, new in changes:
             for name, value in new.items():
                 changed = region.values[name].copy()
                 changed[inside] = value
@@ -142,13 +144,17 @@ class Body:
         return self.prescribe(where, (0.0, 0.0, 0.0))
 
     def prescribe(self, where: Where, u: npt.ArrayLike) -> Body:
-        """Give the nodes of ``where`` the displacement ``u``, m: (3,) or one a node; NaN is free."""
+        """Give the nodes of ``where`` the displacement ``u``, m: (3,) or one row a node.
+
+        A NaN leaves its component as it was, so planes of symmetry add up where they meet.
+        """
         nodes, value = self.mesh.nodes(where), np.asarray(u, dtype=float)
         if value.shape not in ((3,), (len(nodes), 3)):
             raise InputError(f"u must have shape (3,) or ({len(nodes)}, 3), got {value.shape}.")
         value = np.broadcast_to(value, (len(nodes), 3))
-        self._fixed[nodes] = ~np.isnan(value)
-        self._prescribed[nodes] = np.nan_to_num(value)
+        given = ~np.isnan(value)
+        self._fixed[nodes] |= given
+        self._prescribed[nodes] = np.where(given, value, self._prescribed[nodes])
         return self
 
     def slide(
@@ -237,7 +243,7 @@ class Body:
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         u0 = np.zeros_like(self._prescribed) if start is None else self._start(start)
         result, built = self._run(settings, u0, warm=start is not None)
-        newton.require_converged(result, self.mesh)
+        newton.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
         return State(**outcome(result, built, self._fixed), _solved=solved, _form="direct")
 
@@ -273,10 +279,12 @@ class Body:
             result, built = self._run(settings, zero, inverse=True, density_of=density_of)
         else:
             result, built = self._reversed()._run(settings, np.zeros_like(self._prescribed))
-        newton.require_converged(result, self.mesh, inverse=True)
+        newton.require_converged(result, built, self._description, inverse=True)
         solved = terms.snapshot(self._description)
         fields = outcome(result, built, self._fixed)
-        return Rest(**fields, _solved=solved, _form="inverse", method=method)
+        rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
+        newton.require_usable(rest)
+        return rest
 
     def on(self, mesh: Mesh) -> Body:
         """The same laws, supports and loads on a moved copy of the mesh, such as ``rest.mesh``."""
@@ -315,7 +323,7 @@ class Body:
         inverse: bool = False,
         density_of: str = "rest",
     ) -> tuple[Any, terms.Built]:
-        native = settings.checked(self._stiffness(), self.mesh)
+        native = settings.checked(self._rounding(), self.mesh)
         native.warm = warm
         supports.require_held(self.mesh, self._fixed, self._normals())
         built = self._system(inverse, density_of)
@@ -338,15 +346,19 @@ class Body:
         self._built.clear()
         return self
 
-    def _stiffness(self) -> float:
-        """Largest modulus of the body, Pa: the scale of rounding in its internal forces."""
-        values = [
+    def _rounding(self) -> float:
+        """Size of the rounding errors in the internal forces, N: moduli × area, springs × place."""
+        moduli = [
             float(region.values[p.name].max())
             for region in self._description.regions
             for p in region.law.parameters
             if p.kind.unit == "Pa" and len(region.ids)
         ]
-        return max(values, default=1.0)
+        total = 1e-14 * max(moduli, default=1.0) * self.mesh.size**2
+        for slide in self._description.slides:
+            place = max(np.abs(self.mesh.points).max(), np.abs(slide.surface.points).max())
+            total += 2e-15 * float(np.linalg.norm(slide.stiffness)) * float(place)
+        return total
 
     def _normals(self) -> dict[int, Floats]:
         from .core import core

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -186,6 +187,12 @@ class Mesh:
         if not mask.any():
             raise InputError("no boundary facet has all of its nodes in `where`; choose more.")
         return self._outside[mask]
+
+    def placed(self, points: npt.ArrayLike) -> Mesh:
+        """Same cells at new points (n, 3) m, unchecked: to look at a result, whatever it is."""
+        mesh = copy.copy(self)
+        object.__setattr__(mesh, "points", np.array(points, dtype=float))
+        return mesh
 
     def moved(self, points: npt.ArrayLike) -> Mesh:
         """The same cells and tags on other points (n, 3) m, checked for inverted cells."""

@@ -10,10 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from .core import core
-from .errors import ConvergenceError, InputError
+from .errors import ConvergenceError, InputError, MeshError
 
 if TYPE_CHECKING:
     from .mesh import Mesh
+    from .state import Rest
+    from .terms import Built, Description
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[dict[str, float]], None]
@@ -44,8 +46,8 @@ class Settings:
     max_iterations: int = 25
     progress: Progress | None = None
 
-    def checked(self, stiffness: float, mesh: Mesh) -> Any:
-        """The runtime's settings.
+    def checked(self, rounding: float, mesh: Mesh) -> Any:
+        """The runtime's settings; ``rounding`` is that of the internal forces, N.
 
         Raises:
             InputError: a tolerance or a count that makes no sense.
@@ -60,8 +62,7 @@ class Settings:
         native.rtol, native.max_iterations = self.rtol, self.max_iterations
         native.load_steps = self.load_steps or 0
         native.size = mesh.size
-        # Rounding of the internal forces of a body of this stiffness and size, N.
-        native.atol = 1e-14 * stiffness * mesh.size**2 if self.atol is None else self.atol
+        native.atol = rounding if self.atol is None else self.atol
         return native
 
 
@@ -69,12 +70,19 @@ def solve(
     system: Any, start: Floats, prescribed: Floats, native: Any, settings: Settings
 ) -> Any:
     """Run; the result's displacement is ``result.u`` (3n)."""
+    if not np.isfinite(system.residual(start.ravel(), 1.0)).all():
+        raise InputError(
+            "the forces are not finite at the start: a parameter is outside of what its law can "
+            "carry (a skin of this law wants poisson below 0.5), or the start is inverted."
+        )
     report = settings.progress
     hook = None if report is None else lambda i: report(as_dict(i))
     return system.solve(start.ravel(), np.nan_to_num(prescribed).ravel(), native, hook)
 
 
-def require_converged(result: Any, mesh: Mesh, inverse: bool = False) -> None:
+def require_converged(
+    result: Any, built: Built, description: Description, inverse: bool = False
+) -> None:
     """Raise for a result that is no stable equilibrium under the whole load.
 
     Raises:
@@ -84,7 +92,7 @@ def require_converged(result: Any, mesh: Mesh, inverse: bool = False) -> None:
     if name == "converged":
         return
     cause = (_CAUSES_INVERSE if inverse else {}).get(name, _CAUSES[name])
-    cells = worst_cells(result, mesh)
+    cells = worst_cells(result, built, description)
     last = result.history[-1]
     raise ConvergenceError(
         f"no {'rest shape' if inverse else 'equilibrium'}: {cause}; "
@@ -98,12 +106,36 @@ def require_converged(result: Any, mesh: Mesh, inverse: bool = False) -> None:
     )
 
 
-def worst_cells(result: Any, mesh: Mesh, count: int = 5) -> list[int]:
-    """The most compressed cell, then those around the largest residual."""
-    cells: list[int] = [result.worst.cell] if result.worst.value <= 0 else []
+def require_usable(rest: Rest) -> None:
+    """Refuse a rest shape with cells that are inside out between the quadrature points.
+
+    Raises:
+        ConvergenceError: the cells.
+    """
+    try:
+        _ = rest.mesh
+    except MeshError:
+        cause = _CAUSES_INVERSE["inverted"]
+        raise ConvergenceError(
+            f"{cause}: the shape found has cells that are inside out at their corners; "
+            "try a smaller load, a stiffer material, a skin or a finer mesh.",
+            history=rest.history,
+            load_factor=1.0,
+            cause=cause,
+        ) from None
+
+
+def worst_cells(
+    result: Any, built: Built, description: Description, count: int = 5
+) -> list[int]:
+    """Cells of the mesh: the most compressed one, then those around the largest residual."""
+    cells: list[int] = []
+    if result.worst.value <= 0:
+        terms = [r for r, t in zip(description.regions, built.regions, strict=True) if t is not None]
+        cells.append(int(terms[result.worst.term].ids[result.worst.cell]))
     if len(result.last_residual):
         size = np.linalg.norm(result.last_residual.reshape(-1, 3), axis=1)
-        around = np.nan_to_num(size, nan=np.inf)[mesh.cells].max(axis=1)
+        around = np.nan_to_num(size, nan=np.inf)[description.mesh.cells].max(axis=1)
         cells += [int(c) for c in np.argsort(-around, kind="stable")[:count] if c not in cells]
     return cells[:count]
 

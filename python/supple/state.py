@@ -41,6 +41,7 @@ class Equilibrium:
         history: one dict an iteration.
         timings: seconds of "assembly", "factor", "solve", "total".
         energy: potential energy, J; NaN where the loads have none.
+        warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
     """
 
@@ -50,6 +51,7 @@ class Equilibrium:
     timings: dict[str, float]
     energy: float
     reactions: Floats
+    warnings: tuple[str, ...]
     _solved: terms.Description = field(repr=False)  # as it was, with its mesh
     _form: str = field(repr=False)
 
@@ -91,7 +93,7 @@ class Equilibrium:
         in the file. A rest shape's J and stress are those of its loaded state.
         """
         fields = {"J [1]": self.volume_ratio(), "von Mises stress [Pa]": self.von_mises()}
-        return self._solved.mesh.moved(self.points).write(
+        return self._solved.mesh.placed(self.points).write(
             path, {"displacement [m]": self.u}, {**fields, **(cell_data or {})}
         )
 
@@ -169,4 +171,12 @@ def outcome(result: Any, built: terms.Built, fixed: npt.NDArray[np.bool_]) -> di
         "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual.reshape(-1, 3), 0.0),
+        "warnings": _warnings(built.system.volume_ratio(result.u)),
     }
+
+
+def _warnings(smallest: Any) -> tuple[str, ...]:
+    """Laws whose energy stays finite at J = 0 are let through there, and told of here."""
+    if smallest.value > 0:
+        return ()
+    return (f"cells are inverted: the smallest J is {smallest.value:.3g}; use a law with ln J.",)

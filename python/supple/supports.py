@@ -35,8 +35,8 @@ def require_held(mesh: Mesh, fixed: npt.NDArray[np.bool_], normals: dict[int, Fl
         modes = _rigid_modes(mesh.points - mesh.points[piece].mean(axis=0), mesh.size)
         rows = [modes[fixed & inside[:, None]]]
         rows += [(normal @ modes[node])[None] for node, normal in normals.items() if inside[node]]
-        held = np.vstack(rows)
-        _, size, directions = np.linalg.svd(np.vstack([held, np.zeros((6, 6))]))
+        held = np.vstack([*rows, np.zeros((6, 6))])
+        _, size, directions = np.linalg.svd(held, full_matrices=False)
         rank = int((size > 1e-6 * max(size[0], 1.0)).sum())
         if rank < 6:
             free = directions[rank]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import SimpleITK as sitk
-from scipy import ndimage
+from scipy import ndimage, spatial
 
 from supple.breast.facets import (
     FACES,
@@ -48,14 +48,18 @@ def fidelity(
         reach, before thin sheets and islands go); volume_error, segmented_error: relative;
         voxel_mm (largest spacing); surface_p95_mm, surface_max_mm, surface_mean_mm: distance of
         points of the mesh's surface to the faces of the body's voxels; within_one_voxel,
-        within_two_voxels: shares of the surface; positive: share of cells with volume > 0;
-        and the figures of `cell_quality`.
+        within_two_voxels: shares of that surface; region_within_two_voxels: share of the body's
+        outer voxels that have the mesh's surface that near, so that no sheet is lost; positive:
+        share of cells with volume > 0; and the figures of `cell_quality`.
     """
     region = breast_region(labels, tumour_mm=tumour_mm)
     points = mesh.points * 1e3
     facets = boundary_facets(mesh.cells)
     volume = enclosed_volume(points, facets)[0]
-    away, weight = _surface_distance(region.mask, points, facets)
+    samples = np.einsum("sk,fkx->fsx", _barycentric(6), points[facets]).reshape(-1, 3)
+    weight = np.repeat(facet_areas(points, facets), len(samples) // len(facets))
+    away = _distance_to_faces(region.mask, samples)
+    missed = _distance_from_faces(region.mask, samples)
     voxel = max(labels.GetSpacing())
     return {
         "volume_ml": volume / 1e3,
@@ -69,6 +73,7 @@ def fidelity(
         "surface_max_mm": float(away.max()),
         "within_one_voxel": float(np.average(away <= voxel, weights=weight)),
         "within_two_voxels": float(np.average(away <= 2 * voxel, weights=weight)),
+        "region_within_two_voxels": float((missed <= 2 * voxel).mean()),
         "positive": float((signed_volumes(points, mesh.cells) > 0).mean()),
         **cell_quality(points, mesh.cells),
     }
@@ -115,15 +120,29 @@ def _genus(cells: Ints) -> int:
     return parts - euler_number(facets)[0] // 2
 
 
-def _surface_distance(mask: sitk.Image, points: Points, facets: Ints) -> tuple[Points, Points]:
-    """Distance in mm to the faces of the mask's voxels at 10 points a facet, and their areas."""
-    thirds = np.array([(i, j, 3 - i - j) for i in range(4) for j in range(4 - i)]) / 3.0
-    at = np.einsum("sk,fkx->fsx", thirds, points[facets]).reshape(-1, 3)
+def _barycentric(steps: int) -> Points:
+    """(s, 3) evenly spread points of a triangle."""
+    return (
+        np.array([(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)])
+        / steps
+    )
+
+
+def _distance_to_faces(mask: sitk.Image, at: Points) -> Points:
+    """Distance in mm of points (n, 3) to the faces of the mask's voxels."""
     field = sitk.GetArrayFromImage(signed_distance(mask))
     index = voxel_coordinates(mask, at)[:, ::-1].T
-    away = np.abs(ndimage.map_coordinates(field, index, output=float, order=1, mode="nearest"))
-    weight = np.repeat(facet_areas(points, facets) / len(thirds), len(thirds))
-    return away, weight
+    values = ndimage.map_coordinates(field, index, output=float, order=1, mode="nearest")
+    return np.asarray(np.abs(values), float)
+
+
+def _distance_from_faces(mask: sitk.Image, samples: Points) -> Points:
+    """Distance in mm of the mask's outer voxels to the nearest of `samples` (n, 3)."""
+    inside = sitk.GetArrayFromImage(mask).astype(bool)
+    outer = np.argwhere(inside & ~ndimage.binary_erosion(inside))[:, ::-1]
+    axes = np.array(mask.GetDirection()).reshape(3, 3) * np.array(mask.GetSpacing())
+    centres = outer @ axes.T + np.array(mask.GetOrigin())
+    return np.asarray(spatial.cKDTree(samples).query(centres)[0])
 
 
 def _weighted_quantile(values: Points, weights: Points, share: float) -> float:

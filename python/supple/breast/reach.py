@@ -58,7 +58,7 @@ class RegionSettings:
     reach: tuple[float, float] = (20.0, 50.0)
     between: float = 60.0
     behind: float = 30.0
-    sheet: float = 4.0
+    sheet: float = 5.0
     crevice: float = 8.0
     bridge: float = 16.0
     least_part: float = 0.05

@@ -38,6 +38,7 @@ class BreastRegion:
         level: (grid) signed distance to the body's surface, mm, negative inside.
         contact: (grid) what the body borders on: AIR, CHEST, or CUT where tissue or the patient
             goes on beyond a cut or the image; BODY inside it and where nothing is said.
+        parts: how many bodies: 1 where tissue joins the breasts.
         segmented_mm3: volume of the labelled breast tissue within reach, before it is cleaned.
         warnings: one sentence each.
     """
@@ -46,6 +47,7 @@ class BreastRegion:
     grid: PatientGrid
     level: Field
     contact: NDArray[np.uint8]
+    parts: int
     segmented_mm3: float
     warnings: tuple[str, ...]
 
@@ -86,7 +88,8 @@ def breast_region(
     mask = _voxels_below(grid.image(level), tissue)
     segmented = _volume_mm3(tissue * _voxels_below(reached, tissue))
     warnings = sides + _border_warning(labels, mask)
-    return BreastRegion(mask, grid, level, contact, segmented, warnings)
+    parts = int(ndimage.label(solid)[1])
+    return BreastRegion(mask, grid, level, contact, parts, segmented, warnings)
 
 
 def check_labels(labels: sitk.Image) -> None:

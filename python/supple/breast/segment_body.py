@@ -55,7 +55,7 @@ def find_body(signal: Field, air_seeds: Iterable[tuple[int, int, int]] = ()) -> 
     least = float(np.expm1(otsu(np.log1p(blurred[blurred > 0]))))
     bright = ndimage.binary_opening(blurred > least)
     near = smooth(blurred * blurred, bright, 6.0) / np.maximum(smooth(blurred, bright, 6.0), 1e-6)
-    tissue = blurred > np.maximum(AIR_SHARE * near, 0.9 * least)
+    tissue = blurred > np.maximum(AIR_SHARE * near, 0.75 * least)
     tissue = ndimage.binary_opening(tissue, iterations=2)
     check_front(tissue)
     for seed in air_seeds:

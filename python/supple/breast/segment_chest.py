@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from supple.breast.segment_level import Level
     from supple.breast.segment_thorax import Thorax
 
-#: Radius of the first guess and its reach, then the reach around what was seen, mm.
-RADIUS, FIRST_REACH, SECOND_REACH = 78.0, 40.0, 16.0
+#: Radius of the first guess; reach inwards and outwards of it, then of what was seen, mm.
+RADIUS, FIRST_REACH, SECOND_REACH = 78.0, (28.0, 40.0), (14.0, 20.0)
 #: The wall lies at least this deep beneath the skin, mm.
-LEAST_DEPTH = 6.0
+LEAST_DEPTH = 5.0
 #: Price of a change of radius by 1 mm from one sample to the next; at most MOST_STEP mm.
-BEND, MOST_STEP = 0.06, 4
+BEND, MOST_STEP = 0.04, 4
 #: Half of the step that is looked for, mm; a step (ln) that counts as certain.
 _ARM, _CERTAIN = 6, 0.5
 
@@ -71,19 +71,33 @@ def _steps(thorax: Thorax, level: Level, beneath: Field) -> Field:
     relative = ndimage.gaussian_filter(thorax.unroll(level.relative, 0.0), (0.7, 0.7, 0.0))
     mean = ndimage.uniform_filter1d(relative, _ARM, axis=2)
     outside, inside = np.roll(mean, -_ARM // 2, axis=2), np.roll(mean, _ARM // 2, axis=2)
-    step = (inside - outside) if level.fat_suppressed else (outside - inside)
+    if level.fat_suppressed:
+        step = (inside - outside) * _no_lung(np.where(beneath > 8, outside, 0.0))
+    else:
+        step = outside - inside
     step = step * np.exp(-0.5 * (outside / 0.35) ** 2)
-    valid = beneath > LEAST_DEPTH - 1
-    valid &= np.roll(valid, -_ARM // 2, axis=2) & np.roll(valid, _ARM, axis=2)
+    valid = (beneath > LEAST_DEPTH - 1) & np.roll(beneath > 2, -_ARM // 2, axis=2)
+    valid &= np.roll(beneath > LEAST_DEPTH, _ARM, axis=2)
     valid[..., :_ARM] = valid[..., -_ARM:] = False
     return np.where(valid, np.clip(step / _CERTAIN, -0.3, 1.0), 0.0).astype(np.float32)
 
 
+def _no_lung(relative: Field) -> Field:
+    """1 where nothing as dark as lung lies within 25 mm in front, else less: heart is no wall."""
+    darkest = ndimage.minimum_filter1d(relative, 25, axis=2, origin=-12)
+    return np.asarray(np.exp(-0.5 * ((darkest + 0.35).clip(max=0.0) / 0.15) ** 2))
+
+
 def _match(
-    thorax: Thorax, step: Field, forbidden: NDArray[np.bool_], near: Points, reach: float
+    thorax: Thorax,
+    step: Field,
+    forbidden: NDArray[np.bool_],
+    near: Points,
+    reach: tuple[float, float],
 ) -> tuple[Points, Points]:
     """Radius (levels, azimuths) of least cost, and the step seen there."""
-    away = (thorax.radius - near[..., None]) / reach
+    away = thorax.radius - near[..., None]
+    away = away / np.where(away < 0, *reach)
     cost = np.where(forbidden, 3.0, away**2 - step).astype(np.float32)
     total = sum(_sweep(cost, axis, way) for axis in (0, 1) for way in (1, -1))
     best = np.asarray(total).argmin(axis=2)

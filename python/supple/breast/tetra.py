@@ -74,7 +74,7 @@ class MeshSettings:
     Attributes:
         smoothing: standard deviation of the Gaussian that takes the voxels' steps off.
         cells: how many to aim at where no edge_mm is given, and the bounds of `edge` then.
-        lattice: boxes per edge in the lattice that the surface is cut from.
+        lattice: longest edge of the boxes that the body is cut from: sheets are not much thicker.
         chord: how far a facet may lie off the surface.
         gradation: ratio of the lengths of neighbouring edges.
         across_tumour: edges per diameter of the tumour.
@@ -84,7 +84,7 @@ class MeshSettings:
     smoothing: float = 2.0
     cells: int = 12000
     edge: tuple[float, float] = (10.0, 25.0)
-    lattice: float = 3.0
+    lattice: float = 5.0
     chord: float = 1.5
     gradation: float = 1.5
     across_tumour: float = 3.0
@@ -133,11 +133,11 @@ def _edge_for(region: BreastRegion, s: MeshSettings) -> float:
 def _body(
     region: BreastRegion, edge: float, tumour: _Tumour | None, s: MeshSettings
 ) -> tuple[Points, Ints, int]:
-    """Nodes in mm, cells, number of parts; tried again, smoother, where the mesher gives up."""
-    for attempt in (1.0, 1.25, 1.5, 1.75):
+    """Nodes in mm, cells, number of parts; tried again, finer, where that fails."""
+    for attempt in (1.0, 1.2, 1.4):
         try:
-            level = smooth_level(region, attempt * s.smoothing)
-            points, cells = cut_lattice(region.grid, level, edge / s.lattice / np.sqrt(attempt))
+            level = smooth_level(region, s.smoothing / attempt)
+            points, cells = cut_lattice(region.grid, level, min(edge / 3, s.lattice) / attempt)
             points, cells, parts = largest_parts(points, cells, s.least_part)
             for chord in (s.chord, s.chord, None):
                 edges = _edges(points, edge, tumour, s)
@@ -145,6 +145,7 @@ def _body(
                 if chord is not None:
                     points = fit_to_level(region.grid, level, points, cells, region.volume_mm3)
             _check_mesh(points, cells)
+            _check_parts(region, parts)
             return points, cells, parts
         except MeshError as error:
             failure = error
@@ -238,6 +239,14 @@ def _check_mesh(points: Points, cells: Ints) -> None:
         raise MeshError(
             f"the mesh must be closed with positive cells, got a smallest cell of {worst:.3g} mm³"
             f" and a surface that is {'closed' if closed else 'open'}: try another edge_mm."
+        )
+
+
+def _check_parts(region: BreastRegion, parts: int) -> None:
+    if parts > region.parts:
+        raise MeshError(
+            f"the mesh must have {region.parts} part(s) as the labels do, got {parts}: a sheet of"
+            " fat between them is too thin for the mesher; give labels without it."
         )
 
 

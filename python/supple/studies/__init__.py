@@ -1,0 +1,1 @@
+"""Studies: cases with a published or independent answer, as commands that write table and figure."""
