@@ -8,6 +8,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import SimpleITK as sitk
 
 from supple.errors import InputError
@@ -98,14 +99,12 @@ def _stack(files: tuple[str, ...], name: str) -> sitk.Image:
     reader = sitk.ImageSeriesReader()
     reader.SetFileNames(files)
     image: sitk.Image = reader.Execute()
-    first, last = (_header(f) for f in (files[0], files[-1]))
-    ends = [h.GetOrigin() for h in (first, last)]
-    length = sum((b - a) ** 2 for a, b in zip(*ends, strict=True)) ** 0.5
-    spacing = image.GetSpacing()[2]
-    if image.GetDimension() == 3 and abs(length - spacing * (len(files) - 1)) > 0.5 * spacing:
+    places = np.array([_header(file).GetOrigin() for file in files])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    if steps.size and np.ptp(steps) > 0.1 * np.median(steps):
         raise InputError(
-            f"image must be a whole DICOM series, got {name}, whose {len(files)} slices span"
-            f" {length:.1f} mm at {spacing:.3g} mm each: add the missing slices."
+            f"image must be a whole DICOM series, got {name}, whose slices lie {steps.min():.3g} to"
+            f" {steps.max():.3g} mm apart: add the missing slices."
         )
     return image
 

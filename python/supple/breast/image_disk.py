@@ -33,8 +33,8 @@ def check_disk(name: str, path: Path) -> None:
         )
     if lower.endswith((".nii", ".nii.gz")):
         _check_nifti(name, path)
-    elif lower.endswith(".mhd"):
-        _check_mhd(name, path)
+    elif lower.endswith((".mhd", ".mha")):
+        _check_meta(name, path)
 
 
 def _check_nifti(name: str, path: Path) -> None:
@@ -86,30 +86,48 @@ def _nifti_bytes(head: bytes) -> int | None:
     return None
 
 
-def _check_mhd(name: str, path: Path) -> None:
-    """The data file of a MetaImage header: there, not packed in secret, long enough."""
-    fields = {}
-    for line in path.read_text(encoding="latin-1").splitlines():
-        key, _, value = line.partition("=")
-        fields[key.strip()] = value.strip()
-    data = path.parent / fields.get("ElementDataFile", "")
-    if "%" in data.name or data.name in ("LIST", "LOCAL", ""):
+def _check_meta(name: str, path: Path) -> None:
+    """The data of a MetaImage: there, not packed in secret, long enough."""
+    fields, start = _meta_header(path)
+    local = fields.get("ElementDataFile", "").upper() == "LOCAL"
+    data = path if local else path.parent / fields.get("ElementDataFile", "")
+    if "%" in data.name or data.name in ("LIST", ""):
         return
     if not data.is_file():
         raise InputError(f"{name} {path.name} names {data.name}, which is not beside it: add it.")
     packed = fields.get("CompressedData", "False").lower() == "true"
+    start = start if local else 0
     with data.open("rb") as file:
+        file.seek(start)
         gzipped = file.read(2) == _GZIP
     if gzipped and not packed:
         raise InputError(
             f"{name} {path.name} must be as its header says, uncompressed, but {data.name} is"
             f" gzip: unpack it (gunzip) and name the unpacked file in {path.name}."
         )
-    size = [int(n) for n in fields.get("DimSize", "").split()]
-    channels = int(fields.get("ElementNumberOfChannels", 1))
-    expected = math.prod(size) * channels * _META_BYTES.get(fields.get("ElementType", ""), 0)
-    if not packed and data.stat().st_size < expected:
+    expected, actual = _meta_bytes(fields, packed), data.stat().st_size - start
+    if actual < expected:
         raise InputError(
-            f"{name} {path.name} must have {expected} bytes of data, got {data.stat().st_size} in"
-            f" {data.name}: it is truncated; copy or export it again."
+            f"{name} {path.name} must have {expected} bytes of data, got {actual} in {data.name}:"
+            " it is truncated; copy or export it again."
         )
+
+
+def _meta_header(path: Path) -> tuple[dict[str, str], int]:
+    """Fields of a MetaImage header, and the byte at which it ends."""
+    fields: dict[str, str] = {}
+    with path.open("rb") as file:
+        while (line := file.readline(4096)) and "ElementDataFile" not in fields:
+            key, _, value = line.decode("latin-1").partition("=")
+            fields[key.strip()] = value.strip()
+            end = file.tell()
+    return fields, end if fields else 0
+
+
+def _meta_bytes(fields: dict[str, str], packed: bool) -> int:
+    """Bytes of data that a MetaImage header promises, 0 if it does not say."""
+    if packed:
+        return int(fields.get("CompressedDataSize", 0))
+    size = [int(n) for n in fields.get("DimSize", "0").split()]
+    channels = int(fields.get("ElementNumberOfChannels", 1))
+    return math.prod(size) * channels * _META_BYTES.get(fields.get("ElementType", ""), 0)

@@ -134,7 +134,7 @@ def _body(
     region: BreastRegion, edge: float, tumour: _Tumour | None, s: MeshSettings
 ) -> tuple[Points, Ints, int]:
     """Nodes in mm, cells, number of parts; tried again, finer, where that fails."""
-    for attempt in (1.0, 1.2, 1.4):
+    for attempt in (1.0, 1.07, 1.2, 1.4):
         try:
             level = smooth_level(region, s.smoothing / attempt)
             points, cells = cut_lattice(region.grid, level, min(edge / 3, s.lattice) / attempt)
