@@ -151,6 +151,8 @@ class Body:
         nodes, value = self.mesh.nodes(where), np.asarray(u, dtype=float)
         if value.shape not in ((3,), (len(nodes), 3)):
             raise InputError(f"u must have shape (3,) or ({len(nodes)}, 3), got {value.shape}.")
+        if np.isinf(value).any():
+            raise InputError("u must be finite, or NaN where a component is free, got infinity.")
         value = np.broadcast_to(value, (len(nodes), 3))
         given = ~np.isnan(value)
         self._fixed[nodes] |= given

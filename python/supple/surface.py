@@ -108,6 +108,23 @@ class Surface:
         cross = _cross(self.points, self.triangles)
         return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
 
+    def closest(self, points: npt.ArrayLike) -> Any:
+        """Where ``points`` (k, 3) m land on the surface.
+
+        Returns:
+            ``point`` (k, 3) m, ``triangle`` (k,), ``distance`` (k,) m, ``feature`` (k,) 0 in a
+            face, 1 on an edge, 2 at a vertex, ``normal`` (k, 3), ``barycentric`` (k, 3).
+
+        Raises:
+            MeshError: the surface has no triangles.
+        """
+        from supple.core import core
+
+        if len(self.triangles) == 0:
+            raise MeshError("the surface has no triangles to land on; give one that has.")
+        tree = core().SurfaceTree(self.points, self.triangles.astype(np.int32))
+        return tree.closest(np.ascontiguousarray(points, dtype=np.float64))
+
     def __repr__(self) -> str:
         return f"Surface({len(self.points)} points, {len(self.triangles)} triangles)"
 

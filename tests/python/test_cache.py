@@ -1,4 +1,4 @@
-"""Kernels compiled at first use: time, two processes, a killed one, a folder or file not to trust."""
+"""Kernels compiled at first use: time, processes side by side or killed, what is not trusted."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 
 import pytest
-
-import supple
 from supple.kernels import build
 from supple.kernels.unit import Unit
+
+import supple
 
 YEOH = '''"""Yeoh solid, nearly incompressible. Yeoh (1990), Rubber Chem. Technol. 63, eq. 3."""
 
@@ -176,7 +176,9 @@ def test_another_energy_of_a_shipped_name_is_not_mistaken_for_it(tmp_path, monke
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     path = tmp_path / "neo_hookean.py"
     text = supple.material("neo_hookean").path.read_text()
-    path.write_text(text.replace("mu / 2 * (k.I1 - 3)", "mu / 2 * (k.I1 - 3) ** 2 + mu / 2 * (k.I1 - 3)"))
+    path.write_text(
+        text.replace("mu / 2 * (k.I1 - 3)", "mu / 2 * (k.I1 - 3) ** 2 + mu / 2 * (k.I1 - 3)")
+    )
     mesh = supple.Mesh.box((1, 1, 1), (1.0, 1.0, 1.0), "P1")
     ours, theirs = (
         supple.assemble(supple.Body(mesh, law), 0.1 * mesh.points**2)[0]

@@ -9,7 +9,9 @@ import pytest
 
 import supple
 
-HEAD = '"""A law; its source."""\nfrom supple.energy import Kinematics, Pa, Ratio, inner, ln, tr\n\n\n'
+HEAD = (
+    '"""A law; its source."""\nfrom supple.energy import Kinematics, Pa, Ratio, inner, ln, tr\n\n\n'
+)
 GOOD = "    return young / 2 * (k.I1 - 3 - 2 * ln(k.J))\n"
 PSI = "def psi(k: Kinematics, young: Pa = 3e3):\n"
 ESCAPE = "().__class__.__base__.__subclasses__()"
@@ -39,12 +41,16 @@ READING = {
     "string": (PSI + "    return young * 'x'\n", 2, "'x' is not a number"),
     "lambda": (PSI + "    return (lambda: young)()\n", 2, "Lambda is not allowed"),
     "comparison": (PSI + "    return young * (k.J > 1)\n", 2, "Compare is not allowed"),
-    "two targets": (PSI + "    a = tr[%s] = young\n" % ESCAPE + GOOD, 2, "one return"),
-    "subscript target": (PSI + "    tr[%s] = young\n" % ESCAPE + GOOD, 2, "else than names"),
+    "two targets": (PSI + f"    a = tr[{ESCAPE}] = young\n" + GOOD, 2, "one return"),
+    "subscript target": (PSI + f"    tr[{ESCAPE}] = young\n" + GOOD, 2, "else than names"),
     "helper's default": (f"def h(x, y={ESCAPE}):\n    return x\n\n\n" + PSI + GOOD, 1, "default"),
-    "helper's decorator": (f"@{ESCAPE}\ndef h(x):\n    return x\n\n\n" + PSI + GOOD, 2, "decorator"),
+    "helper's decorator": (
+        f"@{ESCAPE}\ndef h(x):\n    return x\n\n\n" + PSI + GOOD,
+        2,
+        "decorator",
+    ),
     "exception": ('exceptions = {"barier"}\n' + PSI + GOOD, 1, "'barier'; did you mean barrier"),
-    "exceptions twice": ("exceptions = tr[%s] = {}\n" % ESCAPE + PSI + GOOD, 1, "not allowed here"),
+    "exceptions twice": (f"exceptions = tr[{ESCAPE}] = 1\n" + PSI + GOOD, 1, "not allowed here"),
     "exceptions called": ("exceptions = set(ln)\n" + PSI + GOOD, 1, "must be a set"),
     "statement": ("ln(2.0)\n" + PSI + GOOD, 1, "Expr is not allowed here"),
     "class": ("class Psi:\n    pass\n" + PSI + GOOD, 1, "ClassDef is not allowed here"),
@@ -56,7 +62,7 @@ READING = {
 
 #: Faults that show in numbers, when the law is first compiled.
 COMPUTING = {
-    "not scalar": (PSI + "    return young * k.E\n", 1, r"not a scalar but has shape \(3, 3\); contr"),
+    "not scalar": (PSI + "    return young * k.E\n", 1, r"a scalar but has shape \(3, 3\); contr"),
     "not objective": (PSI + "    return young * inner(k.F, k.F) + young * tr(k.F) - 6 * young\n", 1,
                       "the stress at F = I"),
     "not objective but stress free": (
@@ -114,8 +120,12 @@ def test_a_wrong_energy_is_refused_before_it_is_compiled(fault, tmp_path):
 def test_a_file_without_docstring_or_of_no_text_is_refused(tmp_path):
     """Also one that is not there, and a folder."""
     path = tmp_path / "mine.py"
-    for content, says in [(PSI.encode() + GOOD.encode(), "has no docstring"), (b"", "docstring"),
-                          (b"\xff\xfe", "is not Python"), (b'"""a\x00"""', "is not Python")]:  # fmt: skip
+    for content, says in [
+        ((PSI + GOOD).encode(), "has no docstring"),
+        (b"", "docstring"),
+        (b"\xff\xfe", "is not Python"),
+        (b'"""a\x00"""', "is not Python"),
+    ]:
         path.write_bytes(content)
         with pytest.raises(supple.MaterialError, match=says):
             supple.material(path)
@@ -129,7 +139,9 @@ def test_a_file_without_docstring_or_of_no_text_is_refused(tmp_path):
 def test_declared_exceptions_let_a_law_pass(tmp_path, monkeypatch):
     """The same energy with its stress at rest declared compiles and works."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    path = written(tmp_path, 'exceptions = {"stress_free"}\n\n\n' + PSI + "    return young * k.I1\n")
+    path = written(
+        tmp_path, 'exceptions = {"stress_free"}\n\n\n' + PSI + "    return young * k.I1\n"
+    )
     energy, residual, _ = supple.assemble(supple.Body(MESH, path), np.zeros_like(MESH.points))
     assert energy == pytest.approx(9e3)
     assert abs(residual).max() > 1e2

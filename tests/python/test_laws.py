@@ -34,7 +34,10 @@ def test_parameters_of_neo_hookean_are_youngs_and_poissons():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: supple.material("neo_hokean"), "no energy is called neo_hokean; did you mean neo_h"),
+        (
+            lambda: supple.material("neo_hokean"),
+            "no energy is called neo_hokean; did you mean neo_h",
+        ),
         (lambda: supple.Body(MESH, "zzz"), "there are corotational_polar, .*neo_hookean"),
         (lambda: supple.Body(MESH, "neo_hookean", yuong=1.0), "yuong; did you mean young"),
         (lambda: supple.Body(MESH, "mooney_rivlin", poisson=0.3), "there are bulk, c1, c2"),
@@ -48,7 +51,10 @@ def test_parameters_of_neo_hookean_are_youngs_and_poissons():
         (lambda: supple.Body(MESH, "neo_hookean").set(poisson=0.7), "got 0.7"),
         (lambda: supple.Body(MESH, "neo_hookean").set(c1=1.0), "has no parameter c1"),
         (lambda: supple.Body(MESH, "neo_hookean").region([0], "neo_hookean", yong=1.0), "young"),
-        (lambda: supple.Body(MESH, "neo_hookean").region([0], "neohookean"), "did you mean neo_hoo"),
+        (
+            lambda: supple.Body(MESH, "neo_hookean").region([0], "neohookean"),
+            "did you mean neo_hoo",
+        ),
         (lambda: supple.Body(MESH, "neo_hookean").skin(lambda p: p[:, 0] == 0, "nh", 1e-3), "nh"),
     ],
 )

@@ -2,7 +2,7 @@
 
 The body: an elliptic thorax with lung inside a muscular wall, a layer of fat around it, two
 half-ellipsoidal breasts that hang towards -y, each with an ellipsoid of gland and a nipple.
-Signals are those of T1-weighted MRI with and without fat suppression, with fall-off and Rician noise.
+Signals are those of T1-weighted MRI with and without fat suppression, with fall-off and noise.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def test_body_and_chest_are_those_of_the_formula(contrast, sagittal):
 
 @pytest.mark.parametrize("contrast", list(SIGNALS))
 def test_surfaces_lie_within_a_voxel(contrast):
-    """Skin: 95 % within a voxel of 2 mm, mean within 0.75 mm; wall behind the breasts: 4 mm."""
+    """Skin: 95 % within a voxel (2 mm), bias at most a quarter of it; 95 % of the wall: 4 mm."""
     labels = result(contrast).labels
     found = sitk.GetArrayFromImage(labels)
     known, (x, y, z) = truth(labels)
@@ -147,9 +147,10 @@ def test_surfaces_lie_within_a_voxel(contrast):
         )
 
     near = (y < -25) & (np.abs(z) < 90)
-    skin = distance(known > 0)[rim(found > 0) & near]
-    assert np.percentile(np.abs(skin), 95) <= 2.0
-    assert abs(skin.mean()) <= 0.75
+    inside = distance(known > 0)[rim(found > 0) & near]
+    outside = distance(known > 0)[rim(found == 0) & near]
+    assert np.percentile(np.abs(inside), 95) <= 2.0
+    assert abs(0.5 * (inside.mean() + outside.mean())) <= 0.5
     behind = (np.abs(x) < 110) & (np.abs(z) < 60) & (y < 40)
     wall = distance(known == Tissue.CHEST)[rim(found == Tissue.CHEST) & behind]
     assert np.percentile(np.abs(wall), 95) <= 4.0
@@ -228,7 +229,7 @@ def test_seeds_move_the_wall_and_grow_gland():
 )
 def test_wrong_seeds_are_refused(seeds):
     """Outside of the image, not three numbers, no such tissue: a sentence that says so."""
-    with pytest.raises(InputError, match="seeds must"):
+    with pytest.raises(InputError, match=r"seeds .*must be"):
         segment(patient("bright fat"), seeds)
 
 

@@ -76,9 +76,13 @@ def test_stresses_of_two_laws_stand_at_their_cells():
     stiff = np.array([1, 4, 7])
     body.region(stiff, "neo_hookean", young=3e3)
     sigma = body.prescribe(everywhere, MESH.points @ A.T).solve().cauchy()
-    ratio = sigma / supple.Body(MESH, "neo_hookean", young=1e3).prescribe(
-        everywhere, MESH.points @ A.T
-    ).solve().cauchy()
+    ratio = (
+        sigma
+        / supple.Body(MESH, "neo_hookean", young=1e3)
+        .prescribe(everywhere, MESH.points @ A.T)
+        .solve()
+        .cauchy()
+    )
     expected = np.where(np.isin(np.arange(12), stiff), 3.0, 1.0)[:, None, None]
     np.testing.assert_allclose(ratio[:, [0, 1, 2], [0, 1, 2]], expected[:, 0] * np.ones(3))
 

@@ -46,13 +46,16 @@ def pulled(element, law, stretch):
     return supple.Body(mesh, law, **PARAMETERS[law]).prescribe(np.arange(len(u)), u)
 
 
-@pytest.mark.parametrize("law", PARAMETERS)
-@pytest.mark.parametrize("element", ["P1", "P2", "Q1", "Q2"])
+@pytest.mark.parametrize(
+    ("law", "element"),
+    [
+        *((law, e) for law in PARAMETERS for e in ("P1", "Q1")),
+        *(("neo_hookean", e) for e in ("P2", "Q2")),
+    ],
+)
 @pytest.mark.parametrize("stretch", [1.3, 0.8])
 def test_uniaxial_tension(element, law, stretch):
     """Lateral stretch where the lateral stress vanishes (a scalar root), and the axial stress."""
-    if law != "neo_hookean" and element in ("P2", "Q2"):
-        pytest.skip("the law's stress is tested on P1 and Q1; P2 and Q2 with neo-Hookean")
     lateral = brentq(
         lambda b: cauchy(law, np.diag([stretch, b, b]))[1, 1], 0.7, 1.3, xtol=1e-15, rtol=1e-15
     )
@@ -108,7 +111,7 @@ def polar_response(F, dF):
 )  # fmt: skip
 @pytest.mark.parametrize("turned", [False, True])
 def test_polar_law_is_smooth_where_stretches_coincide(stretches, turned, rotation):
-    """Stress and tangent of a tetrahedron at equal and nearly equal stretches, by singular values."""
+    """Stress and tangent of a tetrahedron at (nearly) equal stretches, by singular values."""
     F = np.diag(np.array(stretches, float))
     if turned:
         F = rotation @ F @ rotation.T @ rotation

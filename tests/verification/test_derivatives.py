@@ -1,4 +1,4 @@
-"""Every energy on every element: energy → residual → tangent by central differences, at rest zero."""
+"""Every energy on every element: energy → residual → tangent by differences, zero at rest."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_a_free_cell_has_six_zero_modes(unit, compiled_units):
 
 @pytest.mark.parametrize("unit", units("inverse"))
 def test_inverse_residual_is_the_direct_one_read_backwards(unit, compiled_units, distorted):
-    """On the loaded mesh, u' = X - x gives the very nodal forces that u = x - X gives on the rest."""
+    """On the loaded mesh, u' = X - x gives the nodal forces that u = x - X gives on the rest."""
     law, element, _ = unit.split(".")
     rest = distorted(element, (2, 1, 1))
     u = stretched(rest.points).reshape(-1, 3)

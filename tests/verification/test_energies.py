@@ -1,12 +1,12 @@
-"""Shipped energies on numbers: zero and stress free at rest, objective; declared exceptions hold."""
+"""Shipped energies on numbers: stress free at rest, objective; declared exceptions hold."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from supple.kernels import checks, reader
 
 import supple
-from supple.kernels import checks, reader
 
 LAWS = [material.name for material in supple.materials()]
 F = np.array([[1.1, 0.2, 0.0], [0.1, 0.9, 0.15], [-0.05, 0.1, 1.2]])
@@ -21,7 +21,7 @@ def defaults(law):
     return {p.name: p.default for p in law.parameters}
 
 
-def psi(law, F):  # noqa: N803
+def psi(law, F):
     return checks.energy_at(law, F, defaults(law))
 
 

@@ -1,12 +1,12 @@
-"""Patch tests: linear fields and volumes on distorted meshes, quadratics on affine cells of degree 2."""
+"""Patch tests: linear fields and volumes on distorted meshes, quadratics on affine cells."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from supple.kernels.cells import ELEMENTS
 
 import supple
-from supple.kernels.cells import ELEMENTS
 
 A = np.array([[0.2, 0.1, -0.05], [0.0, -0.15, 0.1], [0.05, 0.0, 0.25]])
 F = np.eye(3) + A
@@ -38,7 +38,9 @@ def test_linear_field_on_the_boundary_gives_it_inside(element, curved, degree, l
 def test_volume_of_a_linear_field_is_exact(element, curved, degree, distorted):
     """∫ J dV = det F times the volume at rest = the volume of the moved mesh."""
     mesh = distorted(element, (2, 2, 2), curved)
-    body = supple.Body(mesh, "neo_hookean", quadrature=degree).prescribe(lambda p: p[:, 0] > -9, mesh.points @ A.T)
+    body = supple.Body(mesh, "neo_hookean", quadrature=degree).prescribe(
+        lambda p: p[:, 0] > -9, mesh.points @ A.T
+    )
     state = body.solve()
     J = np.linalg.det(state.deformation_gradient(at="quadrature"))
     volume = (J * state._values.volume).sum()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from supple.kernels.cells import ELEMENTS
 
 import supple
-from supple.kernels.cells import ELEMENTS
 
 EDGE = 0.1
 
 
 def loaded_block(element):
-    """A soft cube held at its base: gravity and traction draw and bend it, with skin on two sides."""
+    """A soft cube held at its base: gravity and traction draw and bend it, skin on two sides."""
     mesh = supple.Mesh.box((2, 2, 2), (EDGE,) * 3, element)
     body = supple.Body(mesh, "neo_hookean", density=1000.0, young=1e3, poisson=0.45)
 
@@ -76,7 +76,6 @@ def test_density_counts_in_the_state_that_is_asked_for(element):
     for density_of in ("rest", "loaded"):
         rest = body.rest_shape(density_of=density_of)
         volume = {"rest": rest.mesh.volume, "loaded": mesh.volume}[density_of]
-        # on curved cells of degree 2 the rest volume is summed by the load's own rule
         held = rest.reactions.sum(axis=0)
         np.testing.assert_allclose(held, -1000.0 * volume * np.array([0, 2.0, 7.0]), rtol=1e-9,
                                    atol=1e-9)  # fmt: skip

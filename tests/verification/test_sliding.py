@@ -29,9 +29,13 @@ def springs(places, inverse=False, stiffness=3.0):
     nodes = list(range(len(places)))
     system.add(
         core().Sliding(
-            system, nodes, np.full(len(nodes), stiffness), TENT.points,
-            TENT.triangles.astype(np.int32), inverse,
-        )  # fmt: skip
+            system,
+            nodes,
+            np.full(len(nodes), stiffness),
+            TENT.points,
+            TENT.triangles.astype(np.int32),
+            inverse,
+        )
     )
     return system
 
@@ -104,7 +108,9 @@ def test_block_slides_down_to_its_stop(element):
     assert stop @ along == pytest.approx(weight * np.sin(ANGLE), rel=1e-9)
     gap = state.points[base] @ normal
     plane = -(node_shares(body.mesh, base) / compliance * gap).sum()
-    held = state.reactions[base].sum(axis=0) @ normal  # the stop's line on the plane has springs too
+    held = (
+        state.reactions[base].sum(axis=0) @ normal
+    )  # the stop's line on the plane has springs too
     held += (state.reactions.sum(axis=0) - state.reactions[base].sum(axis=0)) @ normal
     assert plane + held == pytest.approx(weight * np.cos(ANGLE), rel=1e-9)
     slid = (state.points - body.mesh.points)[base] @ along

@@ -31,7 +31,8 @@ class Materials:
     """Laws and their parameters, SI.
 
     Attributes:
-        law: of all tissues: a shipped energy or an energy file.
+        law: of all tissues: a shipped energy or an energy file. One whose energy is infinite at
+            J = 0 is wanted: the corotational laws fold at the edge of a flattened breast.
         breast: parameters of the law in fat, and in gland and tumour where those give no others.
         gland, tumour: parameters that differ there.
         density: kg/m³ at rest, of all tissues.
@@ -39,7 +40,7 @@ class Materials:
         thickness: of the skin, m.
     """
 
-    law: str = "corotational_polar"
+    law: str = "neo_hookean"
     breast: Mapping[str, float] = field(default_factory=lambda: {"young": 1e3, "poisson": 0.45})
     gland: Mapping[str, float] = field(default_factory=dict)
     tumour: Mapping[str, float] = field(default_factory=dict)
@@ -61,30 +62,36 @@ class Materials:
             raise InputError(f"parameters must be of {', '.join(known)}, got {name!r}: choose one.")
         return float(values[key])
 
-    def scaled(self, **factors: float) -> Materials:
-        """Copy with parameters multiplied by factors, their dots written as two underscores.
+    def given(self, values: Mapping[str, float]) -> Materials:
+        """Copy with parameters set by full name; gland and tumour keep their ratio to the breast.
 
-        Gland and tumour keep their ratio to the breast, so one factor makes all tissue softer.
+        Raises:
+            InputError: no such part or parameter.
         """
         changed = self
-        for name, factor in factors.items():
-            part, _, key = name.partition("__")
-            changed = _times(changed, part, key, factor)
-            if part == "breast":
-                changed = _times(_times(changed, "gland", key, factor), "tumour", key, factor)
+        for name, value in values.items():
+            part, _, key = name.partition(".")
+            changed = changed._times(part, {key}, value / self.of(name))
         return changed
 
-    def given(self, **values: float) -> Materials:
-        """Copy with parameters set to values; written as for `scaled`, ratios kept as there."""
-        factors = {n: v / self.of(n.replace("__", ".")) for n, v in values.items()}
-        return self.scaled(**factors)
+    def stiffer(self, factor: float) -> Materials:
+        """Copy with all moduli of all tissues, not of the skin, multiplied by ``factor``."""
+        moduli = {p.name for p in supple.material(self.law).parameters if p.unit == "Pa"}
+        return self._times("breast", moduli, factor)
 
+    def described(self) -> str:
+        """The breast's parameters in words."""
+        units = {p.name: p.unit for p in supple.material(self.law).parameters}
+        values = (f"{k} {v:.4g} {units.get(k, '')}".removesuffix(" 1") for k, v in self.breast.items())
+        return f"a breast of {self.law} with {', '.join(values)}"
 
-def _times(materials: Materials, part: str, key: str, factor: float) -> Materials:
-    values = dict(getattr(materials, part))
-    if key in values:
-        values[key] *= factor
-    return replace(materials, **{part: values})
+    def _times(self, part: str, keys: set[str], factor: float) -> Materials:
+        parts = ("breast", "gland", "tumour") if part == "breast" else (part,)
+        changed = {}
+        for name in parts:
+            old: Mapping[str, float] = getattr(self, name)
+            changed[name] = {k: v * factor if k in keys else v for k, v in old.items()}
+        return replace(self, **changed)  # type: ignore[arg-type]
 
 
 def build_body(

@@ -59,15 +59,13 @@ def _fat_suppressed(log: Field, depth: Field, breasts: Mask) -> bool:
     """Whether tissue in the breasts is brighter than the fat beneath their skin.
 
     Without suppression nothing in a T1-weighted breast outshines fat; with it vessels, gland and
-    tumours do. A breast of little fat is told by the second condition: the deviations from the
-    mean near by are skewed towards bright where bright things are few.
+    tumours do.
     """
     shell, deep = breasts & (depth > 3) & (depth < 8), breasts & (depth > 8)
+    if not deep.any():
+        return False
     above = (log - smooth(log, shell, 8.0))[deep]
-    signal = np.exp(log - log[deep].mean())
-    ratio = (signal / smooth(signal, breasts & (depth > 6), 6.0))[deep]
-    skew = float(np.mean((ratio - ratio.mean()) ** 3) / ratio.std() ** 3)
-    return bool(np.percentile(above, 98) > BRIGHTER_THAN_FAT and skew > 0)
+    return bool(np.percentile(above, 98) > BRIGHTER_THAN_FAT)
 
 
 def _spread(log: Field, fat: Mask) -> Field:

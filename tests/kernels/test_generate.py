@@ -1,0 +1,71 @@
+"""Generated libraries: what their table says, clean C, independent of where one stands."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+
+import pytest
+from supple.kernels import build, generate, unit
+
+from supple import material
+from supple.laws import _ahead
+
+
+@pytest.fixture(scope="module")
+def contract():
+    return (_ahead() / "kernel.h").read_text()
+
+
+def source(name, contract):
+    return generate.source(unit.parse(name, material("neo_hookean").path.parent), contract)
+
+
+def statements(text):
+    """The code without comments and without UFL's running numbers of meshes and coefficients."""
+    return re.sub(r"\b([Jw])\d+_", r"\1_", re.sub(r"//.*", "", text))
+
+
+def test_options_of_ffcx_in_the_working_folder_change_nothing(contract, tmp_path, monkeypatch):
+    """FFCx reads ffcx_options.json where one stands; kernels must not."""
+    before = statements(source("neo_hookean.P1.direct", contract))
+    (tmp_path / "ffcx_options.json").write_text('{"scalar_type": "float32", "epsilon": 0.5}')
+    monkeypatch.chdir(tmp_path)
+    assert statements(source("neo_hookean.P1.direct", contract)) == before
+
+
+def test_the_table_names_unit_law_and_fields(contract):
+    """Name, the file's hash, the fields with their sizes, all kernels of a solid."""
+    from supple.kernels import reader
+
+    text = source("mooney_rivlin.Q1.direct", contract)
+    law = reader.read(material("mooney_rivlin").path)
+    assert f'"mooney_rivlin.Q1.direct", "{law.source_hash}", "Q1", 8, 1, 2' in text
+    fields = re.search(r"fields\[\] = \{(.*)\};", text)[1]
+    assert fields == '{"u", 24}, {"c1", 1}, {"c2", 1}, {"bulk", 1}'
+    for kernel in ("energy", "residual", "tangent", "volume_ratio", "points"):
+        assert f'{{"{kernel}", ' in text
+
+
+@pytest.mark.parametrize("name", ["neo_hookean.P1.direct", "neo_hookean.T1.skin_inverse",
+                                  "pressure_moved.S1", "corotational_polar.P1.direct"])  # fmt: skip
+def test_generated_c_compiles_without_a_warning(name, contract, tmp_path):
+    """-Wall -Werror."""
+    (tmp_path / "k.c").write_text(source(name, contract))
+    command = [build._compiler(), "-std=c17", "-O0", "-Wall", "-Werror", "-fPIC", "-c", "k.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("wrong", ["neo_hookean", "neo_hookean.P9.direct", "neo_hookean.P1.up",
+                                   "neo_hookean.P1.direct.q2.x", "traction.T1.T1"])  # fmt: skip
+def test_a_name_that_is_no_unit_is_refused(wrong, tmp_path):
+    with pytest.raises(ValueError, match=r"expected law\.element\.form"):
+        unit.parse(wrong, tmp_path)
+
+
+def test_names_of_units_are_read_back(tmp_path):
+    """parse is the inverse of name, with and without a degree."""
+    for name in ("neo_hookean.P1.direct", "mine.Q2.inverse.q6", "x.S2.skin_direct", "traction.T1"):
+        assert unit.parse(name, tmp_path).name == name
+    assert len({u.name for u in unit.loads()}) == len(unit.loads()) == 2 * 4 + 4 * 4
