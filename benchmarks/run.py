@@ -27,7 +27,11 @@ DIVISIONS = {"P1": (44, 8, 8), "P2": (17, 5, 5), "Q1": (44, 8, 8), "Q2": (29, 5,
 #: Tip displacement, m, where a node lies at the centre of the loaded face.
 TIPS = {
     ("P1", "neo_hookean"): (-5.027239479839573, -25.920530984672247, 0.4953677980656953),
-    ("P1", "saint_venant_kirchhoff"): (-5.2047873497470585, -25.893187570205303, 0.5027476127170587),
+    ("P1", "saint_venant_kirchhoff"): (
+        -5.2047873497470585,
+        -25.893187570205303,
+        0.5027476127170587,
+    ),
     ("P2", "neo_hookean"): (-5.586975440050646, -27.254294299844197, 0.0015302842010909254),
     ("Q1", "neo_hookean"): (-5.512033333523699, -27.084478157560234, 0.0),
     ("Q1", "saint_venant_kirchhoff"): (-5.710078330369014, -27.090858781927068, 0.0),
@@ -54,7 +58,9 @@ def solve(element: str, law: str) -> tuple[supple.State, float | None]:
     """One cold solve, and the relative error of its tip where that is known."""
     mesh = supple.Mesh.box(DIVISIONS[element], (LENGTH, WIDTH, WIDTH), element)
     body = supple.Body(mesh, law, young=3e3, poisson=0.3)
-    body.fix(lambda x: x[:, 0] < 1e-9).traction(lambda x: x[:, 0] > LENGTH - 1e-9, (0.0, -10.0, 0.0))
+    body.fix(lambda x: x[:, 0] < 1e-9).traction(
+        lambda x: x[:, 0] > LENGTH - 1e-9, (0.0, -10.0, 0.0)
+    )
     state = body.solve(load_steps=1)
     tip = TIPS[element, law]
     if tip is None:

@@ -140,7 +140,9 @@ def _compile(unit: Unit, contract: str, cached: Path) -> None:
         command = [compiler, level, *FLAGS, "kernels.c", "-o", "kernels.so", "-lm"]
         done = subprocess.run(command, cwd=aside, capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            raise BuildError(f"{compiler} could not compile {unit.name}: {done.stderr.strip()[:500]}")
+            raise BuildError(
+                f"{compiler} could not compile {unit.name}: {done.stderr.strip()[:500]}"
+            )
         digest = hashlib.sha256((aside / "kernels.so").read_bytes()).hexdigest()
         (aside / "sha256").write_text(digest, encoding="ascii")
         (aside / "kernels.c").unlink()

@@ -70,7 +70,9 @@ def require_sound(law: Law) -> None:
     values = {p.name: p.default for p in law.parameters}
     scale = stiffness_scale(law, values)
     if not np.isfinite(scale) or scale == 0.0:
-        raise EnergyFileError(f"{law.path}:{law.line}: the energy has no finite stiffness at F = I; check it.")
+        raise EnergyFileError(
+            f"{law.path}:{law.line}: the energy has no finite stiffness at F = I; check it."
+        )
     if "stress_free" not in law.exceptions:
         _require_stress_free(law, values, scale)
     if "objective" not in law.exceptions:
@@ -81,10 +83,14 @@ def _require_stress_free(law: Law, values: dict[str, Any], scale: float) -> None
     declare = 'subtract its value at F = I, or declare exceptions = {"stress_free"}.'
     psi = energy_at(law, np.eye(3), values)
     if abs(psi) > 1e-10 * scale:
-        raise EnergyFileError(f"{law.path}:{law.line}: psi at F = I is {psi:.6g} Pa, not 0; {declare}")
+        raise EnergyFileError(
+            f"{law.path}:{law.line}: psi at F = I is {psi:.6g} Pa, not 0; {declare}"
+        )
     stress = np.abs(stress_at(law, np.eye(3), values)).max()
     if stress > 1e-6 * scale:
-        raise EnergyFileError(f"{law.path}:{law.line}: the stress at F = I is {stress:.6g} Pa, not 0; {declare}")
+        raise EnergyFileError(
+            f"{law.path}:{law.line}: the stress at F = I is {stress:.6g} Pa, not 0; {declare}"
+        )
 
 
 def _require_objective(law: Law, values: dict[str, Any], scale: float) -> None:

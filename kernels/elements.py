@@ -80,7 +80,9 @@ def _nodal_serendipity(cell: str) -> Any:
     M: list[list[np.ndarray]] = [[] for _ in range(4)]
     for d in range(tdim + 1):
         for vertices in topology[d]:
-            points = geometry[vertices].mean(axis=0, keepdims=True) if d < 2 else np.zeros((0, tdim))
+            points = (
+                geometry[vertices].mean(axis=0, keepdims=True) if d < 2 else np.zeros((0, tdim))
+            )
             x[d].append(points)
             M[d].append(np.ones((1, 1, 1, 1)) if d < 2 else np.zeros((0, 1, 0, 1)))
     return basix.ufl.custom_element(

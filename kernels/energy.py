@@ -120,17 +120,17 @@ class Volumetric:
     conjugate: Any
 
 
-def log_volumetric(J: Any, bulk: Any) -> Volumetric:  # noqa: N803
+def log_volumetric(J: Any, bulk: Any) -> Volumetric:
     """bulk/2 ln(J)²."""
     return Volumetric(bulk / 2 * ln(J) ** 2, ln(J), lambda p: p**2 / (2 * bulk))
 
 
-def quadratic_volumetric(J: Any, bulk: Any) -> Volumetric:  # noqa: N803
+def quadratic_volumetric(J: Any, bulk: Any) -> Volumetric:
     """bulk/2 (J - 1)²."""
     return Volumetric(bulk / 2 * (J - 1) ** 2, J - 1, lambda p: p**2 / (2 * bulk))
 
 
-def ogden_volumetric(J: Any, bulk: Any) -> Volumetric:  # noqa: N803
+def ogden_volumetric(J: Any, bulk: Any) -> Volumetric:
     """bulk/4 (J² - 1 - 2 ln J); Mazier 2022, eq. 70."""
 
     # With s = ln J: U*(p) = max over s of p s - U(e^s), reached where e^(2s) = 1 + 2 p / bulk.

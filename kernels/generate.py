@@ -77,7 +77,9 @@ def source(unit: Unit, contract: str) -> str:
     kernels = [_kernel(name, item, forms) for name, item in forms.kernels.items()]
     sizes = [_size(c) for c in forms.fields.values()]
     weights = elements.quadrature(unit.element, forms.degree)[1]
-    head = _HEAD.format(unit=unit.name, origin=unit.law.name if unit.law else "forms", contract=contract)
+    head = _HEAD.format(
+        unit=unit.name, origin=unit.law.name if unit.law else "forms", contract=contract
+    )
     tail = _TAIL.format(
         fields=", ".join(f'{{"{n}", {s}}}' for n, s in zip(names, sizes, strict=True)),
         weights=", ".join(repr(float(w)) for w in weights),

@@ -28,65 +28,65 @@ class Kinematics:
         self._F, self._edges, self._C, self._J = F, edges, C, J
 
     @cached_property
-    def F(self) -> Any:  # noqa: N802
+    def F(self) -> Any:
         """Deformation gradient (3, 3); of a membrane its stretch tensor."""
         return self.U if self._F is None else self._F
 
     @cached_property
-    def C(self) -> Any:  # noqa: N802
+    def C(self) -> Any:
         """FᵀF."""
         return self._F.T * self._F if self._C is None else self._C
 
     @cached_property
-    def B(self) -> Any:  # noqa: N802
+    def B(self) -> Any:
         """F Fᵀ."""
         return self.F * self.F.T
 
     @cached_property
-    def E(self) -> Any:  # noqa: N802
+    def E(self) -> Any:
         """(C - I)/2, Green–Lagrange."""
         return 0.5 * (self.C - _identity_like(self.C))
 
     @cached_property
-    def J(self) -> Any:  # noqa: N802
+    def J(self) -> Any:
         """det F."""
         return e.det(self._F) if self._J is None else self._J
 
     @cached_property
-    def I1(self) -> Any:  # noqa: N802
+    def I1(self) -> Any:
         """tr C."""
         return e.tr(self.C)
 
     @cached_property
-    def I2(self) -> Any:  # noqa: N802
+    def I2(self) -> Any:
         """(I1² - tr C²)/2."""
         return 0.5 * (self.I1**2 - e.inner(self.C, self.C))
 
     @cached_property
-    def I3(self) -> Any:  # noqa: N802
+    def I3(self) -> Any:
         """det C = J²."""
         return self.J**2
 
     @cached_property
-    def I1_bar(self) -> Any:  # noqa: N802
+    def I1_bar(self) -> Any:
         """J^(-2/3) I1."""
         return self.J ** (-2.0 / 3.0) * self.I1
 
     @cached_property
-    def I2_bar(self) -> Any:  # noqa: N802
+    def I2_bar(self) -> Any:
         """J^(-4/3) I2."""
         return self.J ** (-4.0 / 3.0) * self.I2
 
-    def I4(self, f: Any) -> Any:  # noqa: N802
+    def I4(self, f: Any) -> Any:
         """f·C f, the squared stretch of the fibre direction ``f`` (3,)."""
         return e.dot(f, self.C * f)
 
-    def I8(self, f: Any, s: Any) -> Any:  # noqa: N802
+    def I8(self, f: Any, s: Any) -> Any:
         """f·C s."""
         return e.dot(f, self.C * s)
 
     @cached_property
-    def trace_U(self) -> Any:  # noqa: N802
+    def trace_U(self) -> Any:
         """tr U, the sum of the principal stretches, with exact derivatives where they coincide.
 
         It is the largest root y of y⁴ - 2 I1 y² - 8 J y + I1² - 4 I2 = 0, a simple root as long as
@@ -104,7 +104,7 @@ class Kinematics:
         return y
 
     @cached_property
-    def U(self) -> Any:  # noqa: N802
+    def U(self) -> Any:
         """Right stretch tensor (3, 3); Hoger and Carlson (1984), Q. Appl. Math. 42, eq. 3.7."""
         i1, i3 = self.trace_U, self.J
         i2 = 0.5 * (i1**2 - self.I1)
@@ -141,7 +141,7 @@ def _identity_like(a: Any) -> Any:
     return e.identity()
 
 
-def _trace_of_stretch(C: np.ndarray, J: float) -> float:  # noqa: N803
+def _trace_of_stretch(C: np.ndarray, J: float) -> float:
     stretches = np.sqrt(np.maximum(np.linalg.eigvalsh(C), 0.0))
     stretches[0] *= np.sign(J) if J < 0 else 1.0
     return float(stretches.sum())

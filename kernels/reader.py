@@ -116,7 +116,7 @@ class Law:
             return f["psi"](k, **self.arguments("psi", values))
         return f["psi_dev"](k, **self.arguments("psi_dev", values)) + self.psi_vol(k.J, values).U
 
-    def psi_vol(self, J: Any, values: dict[str, Any]) -> energy.Volumetric:  # noqa: N803
+    def psi_vol(self, J: Any, values: dict[str, Any]) -> energy.Volumetric:
         """The volumetric part of a nearly incompressible law."""
         volumetric = self._functions["psi_vol"](J, **self.arguments("psi_vol", values))
         if not isinstance(volumetric, energy.Volumetric):
@@ -197,7 +197,9 @@ class _Checker:
         for node in self.tree.body[1:]:
             self.statement(node)
         if not {"psi", "psi_dev"} & set(self.functions):
-            raise self.fail(self.tree, "defines no energy; define psi(k, ...), or psi_dev and psi_vol.")
+            raise self.fail(
+                self.tree, "defines no energy; define psi(k, ...), or psi_dev and psi_vol."
+            )
         if "psi" not in self.functions and "psi_vol" not in self.functions:
             raise self.fail(self.tree, "defines psi_dev without psi_vol; add psi_vol(J, ...).")
         for f in self.functions.values():
@@ -212,11 +214,15 @@ class _Checker:
                 self.imported.add(alias.name)
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             raise self.fail(node, "imports something else than supple.energy; remove that import.")
-        elif isinstance(node, ast.Assign) and [ast.unparse(t) for t in node.targets] == ["exceptions"]:
+        elif isinstance(node, ast.Assign) and [ast.unparse(t) for t in node.targets] == [
+            "exceptions"
+        ]:
             self.exceptions = self.declared(node)
         elif not isinstance(node, ast.FunctionDef):
             kind = type(node).__name__
-            raise self.fail(node, f"{kind} is not allowed here; a file holds functions of expressions.")
+            raise self.fail(
+                node, f"{kind} is not allowed here; a file holds functions of expressions."
+            )
 
     def declared(self, node: ast.Assign) -> frozenset[str]:
         try:
@@ -225,7 +231,9 @@ class _Checker:
             raise self.fail(node, 'exceptions must be a set such as {"barrier"}.') from None
         for name in names:
             if name not in EXCEPTIONS:
-                raise self.fail(node, f"unknown exception {name!r}; {nearest(str(name), EXCEPTIONS)}")
+                raise self.fail(
+                    node, f"unknown exception {name!r}; {nearest(str(name), EXCEPTIONS)}"
+                )
         return frozenset(names)
 
     def function(self, f: ast.FunctionDef) -> None:
@@ -301,9 +309,13 @@ class _Checker:
     def parameter(self, argument: ast.arg, default: ast.expr | None) -> Parameter:
         name = argument.arg
         if argument.annotation is None or default is None:
-            raise self.fail(argument, f"{name} needs a type and a default, such as {name}: Pa = 1e3.")
+            raise self.fail(
+                argument, f"{name} needs a type and a default, such as {name}: Pa = 1e3."
+            )
         if name in RESERVED:
-            raise self.fail(argument, f"{name} is a name of Supple's own; call the parameter otherwise.")
+            raise self.fail(
+                argument, f"{name} is a name of Supple's own; call the parameter otherwise."
+            )
         value = self.number(argument, f"the default of {name}", default)
         kind = self.kind(argument.annotation, name)
         if not kind.admits(value):
@@ -315,11 +327,16 @@ class _Checker:
         word = call.func if call else annotation
         kind = getattr(energy, word.id, None) if isinstance(word, ast.Name) else None
         if not isinstance(kind, energy.Kind):
-            raise self.fail(annotation, f"{name} has an unknown type; use Pa, Ratio, Number, Metre or Direction.")
+            raise self.fail(
+                annotation,
+                f"{name} has an unknown type; use Pa, Ratio, Number, Metre or Direction.",
+            )
         if call is None:
             return kind
         try:
             bounds = {k.arg: ast.literal_eval(k.value) for k in call.keywords if k.arg}
             return kind(**bounds)
         except (ValueError, TypeError):
-            raise self.fail(annotation, f"the bounds of {name} are wrong; write Pa(minimum=0.0).") from None
+            raise self.fail(
+                annotation, f"the bounds of {name} are wrong; write Pa(minimum=0.0)."
+            ) from None

@@ -27,7 +27,7 @@ class Frozen(MathFunction):
 lnodes._ufl_call_lookup[Frozen] = lnodes._math_function
 
 
-def trace_seed(I1: Any, I2: Any, J: Any) -> Any:  # noqa: N803
+def trace_seed(I1: Any, I2: Any, J: Any) -> Any:
     """tr U from the closed-form eigenvalues of C, the sign of J on the smallest stretch.
 
     Source: Smith (1961), Commun. ACM 4(4), trigonometric eigenvalues of a symmetric 3 x 3 matrix.

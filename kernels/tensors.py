@@ -16,7 +16,7 @@ class Tensor(np.ndarray):
         return np.ndarray.__mul__(self, other)
 
     @property
-    def T(self) -> Tensor:  # noqa: N802 (UFL's name)
+    def T(self) -> Tensor:
         return self.transpose().view(Tensor)
 
 

@@ -50,16 +50,16 @@ void bind_terms(py::module_& module) {
            })
       .def("volume_ratio", &supple::Term::volume_ratio);
   py::class_<supple::NodalForce, supple::Term, std::shared_ptr<supple::NodalForce>>(module,
-                                                                                   "NodalForce")
+                                                                                    "NodalForce")
       .def(py::init<Vector>())
       .def("set_forces", &supple::NodalForce::set_forces);
   py::class_<supple::KernelTerm, supple::Term, std::shared_ptr<supple::KernelTerm>>(module,
-                                                                                   "KernelTerm")
-      .def(py::init([](const std::string& library, const supple::System& system,
-                       const CellArray& cells) {
-        return std::make_shared<supple::KernelTerm>(supple::KernelLibrary::load(library),
-                                                    system.points(), connectivity(cells));
-      }))
+                                                                                    "KernelTerm")
+      .def(py::init(
+          [](const std::string& library, const supple::System& system, const CellArray& cells) {
+            return std::make_shared<supple::KernelTerm>(supple::KernelLibrary::load(library),
+                                                        system.points(), connectivity(cells));
+          }))
       .def("set_field", &supple::KernelTerm::set_field)
       .def("tabulate", &supple::KernelTerm::tabulate)
       .def_property_readonly("weights", [](const supple::KernelTerm& term) {
@@ -117,7 +117,7 @@ void bind_newton(py::module_& module) {
       .def_readonly("negative", &NewtonResult::negative);
 }
 
-}  // namespace
+} // namespace
 
 void bind_system(py::module_& module) {
   using supple::System;

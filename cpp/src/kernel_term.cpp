@@ -9,16 +9,16 @@ namespace supple {
 
 namespace {
 
-constexpr Index kSmallestGroup = 16;   // cells that one thread treats in one go, at least
-constexpr Index kMostGroups = 48;      // few groups need few colours, and a colour ends in a barrier
-constexpr Index kWorthThreads = 1000;  // fewer cells are done before a second thread is awake
+constexpr Index kSmallestGroup = 16;  // cells that one thread treats in one go, at least
+constexpr Index kMostGroups = 48;     // few groups need few colours, and a colour ends in a barrier
+constexpr Index kWorthThreads = 1000; // fewer cells are done before a second thread is awake
 
 Index group_size(Index cells, Index lanes) {
   const Index size = std::max(kSmallestGroup, (cells + kMostGroups - 1) / kMostGroups);
   return (size + lanes - 1) / lanes * lanes;
 }
 
-}  // namespace
+} // namespace
 
 struct KernelTerm::Buffers {
   std::vector<double> A, w, x;
@@ -74,17 +74,20 @@ void KernelTerm::call(const supple_kernel& kernel, Index first, const ConstVecto
       const std::ptrdiff_t cell = std::min<std::ptrdiff_t>(first + lane, cells_.rows() - 1);
       if (nodal) {
         const Index* node = cells_.data() + cell * m;
-        for (std::ptrdiff_t i = 0; i < size; ++i) w[i * lanes + lane] = u[3 * node[i / 3] + i % 3];
+        for (std::ptrdiff_t i = 0; i < size; ++i)
+          w[i * lanes + lane] = u[3 * node[i / 3] + i % 3];
       } else {
         const double* value = fields_[number].data() + cell * size;
-        for (std::ptrdiff_t i = 0; i < size; ++i) w[i * lanes + lane] = value[i];
+        for (std::ptrdiff_t i = 0; i < size; ++i)
+          w[i * lanes + lane] = value[i];
       }
     }
     w += size * lanes;
   }
   const double* points = points_->data();
   for (std::ptrdiff_t lane = 0; lane < lanes; ++lane) {
-    const Index* node = cells_.data() + std::min<std::ptrdiff_t>(first + lane, cells_.rows() - 1) * m;
+    const Index* node =
+        cells_.data() + std::min<std::ptrdiff_t>(first + lane, cells_.rows() - 1) * m;
     for (std::ptrdiff_t i = 0; i < 3 * m; ++i) {
       b.x[static_cast<std::size_t>(i * lanes + lane)] = points[3 * node[i / 3] + i % 3];
     }
@@ -106,7 +109,8 @@ void KernelTerm::each(const supple_kernel& kernel, const ConstVector& u, Consume
 #pragma omp parallel if (cells >= kWorthThreads)
   {
     Buffers b;
-    b.A.resize(static_cast<std::size_t>(kernel.rows) * static_cast<std::size_t>(kernel.cols) * width);
+    b.A.resize(static_cast<std::size_t>(kernel.rows) * static_cast<std::size_t>(kernel.cols) *
+               width);
     b.w.resize(std::max<std::size_t>(w_size, 1) * width);
     b.x.resize(3 * static_cast<std::size_t>(table.nodes) * width);
     for (Index colour = 0; colour < colouring_.colours(); ++colour) {
@@ -126,13 +130,15 @@ void KernelTerm::each(const supple_kernel& kernel, const ConstVector& u, Consume
 }
 
 double KernelTerm::energy(const ConstVector& u) const {
-  if (energy_ == nullptr) return constant().dot(u);  // a load that does not depend on u
+  if (energy_ == nullptr) return constant().dot(u); // a load that does not depend on u
   std::vector<double> sums(colouring_.order.size(), 0.0);
   each(*energy_, u, [&](Index, Index count, const double* A, Index batch) {
-    for (Index lane = 0; lane < count; ++lane) sums[static_cast<std::size_t>(batch)] += A[lane];
+    for (Index lane = 0; lane < count; ++lane)
+      sums[static_cast<std::size_t>(batch)] += A[lane];
   });
   double total = 0.0;
-  for (const double sum : sums) total += sum;
+  for (const double sum : sums)
+    total += sum;
   return total;
 }
 
@@ -158,7 +164,8 @@ void KernelTerm::add_residual(const ConstVector& u, double scale, MutableVector 
   each(*residual_, u, [&](Index first, Index count, const double* A, Index) {
     for (Index lane = 0; lane < count; ++lane) {
       const Index* node = cells_.data() + static_cast<std::ptrdiff_t>(first + lane) * m;
-      for (Index i = 0; i < 3 * m; ++i) r[3 * node[i / 3] + i % 3] += scale * A[i * lanes + lane];
+      for (Index i = 0; i < 3 * m; ++i)
+        r[3 * node[i / 3] + i % 3] += scale * A[i * lanes + lane];
     }
   });
 }
@@ -170,7 +177,8 @@ void KernelTerm::tangent(const ConstVector& u, double scale, const Scatter& map,
   const std::ptrdiff_t entries = std::ptrdiff_t{tangent_->rows} * tangent_->cols;
   each(*tangent_, u, [&](Index first, Index count, double* A, Index) {
     if (scale != 1.0) {
-      for (std::ptrdiff_t i = 0; i < entries * lanes; ++i) A[i] *= scale;
+      for (std::ptrdiff_t i = 0; i < entries * lanes; ++i)
+        A[i] *= scale;
     }
     for (Index lane = 0; lane < count; ++lane) {
       scatter_add(map, first + lane, A + lane, values.data(), lanes);
@@ -205,10 +213,11 @@ Eigen::MatrixXd KernelTerm::tabulate(const std::string& name, const ConstVector&
   Eigen::MatrixXd out(cells_.rows(), entries);
   each(kernel, u, [&](Index first, Index count, const double* A, Index) {
     for (Index lane = 0; lane < count; ++lane) {
-      for (std::ptrdiff_t i = 0; i < entries; ++i) out(first + lane, i) = A[i * lanes + lane];
+      for (std::ptrdiff_t i = 0; i < entries; ++i)
+        out(first + lane, i) = A[i * lanes + lane];
     }
   });
   return out;
 }
 
-}  // namespace supple
+} // namespace supple

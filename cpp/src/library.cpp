@@ -29,7 +29,7 @@ const supple_library* open_table(const std::string& path) {
   return table;
 }
 
-}  // namespace
+} // namespace
 
 std::shared_ptr<const KernelLibrary> KernelLibrary::load(const std::string& path) {
   static std::mutex mutex;
@@ -57,8 +57,10 @@ const supple_kernel* KernelLibrary::find(const std::string& name) const {
 const supple_kernel& KernelLibrary::require(const std::string& name) const {
   if (const supple_kernel* kernel = find(name)) return *kernel;
   std::string there;
-  for (int i = 0; i < table_->kernel_count; ++i) there += std::string(" ") + table_->kernels[i].name;
-  throw Error(std::string("kernel library ") + table_->unit + " has no " + name + "; it has" + there);
+  for (int i = 0; i < table_->kernel_count; ++i)
+    there += std::string(" ") + table_->kernels[i].name;
+  throw Error(std::string("kernel library ") + table_->unit + " has no " + name + "; it has" +
+              there);
 }
 
 int KernelLibrary::field(const std::string& name) const {
@@ -68,4 +70,4 @@ int KernelLibrary::field(const std::string& name) const {
   return -1;
 }
 
-}  // namespace supple
+} // namespace supple

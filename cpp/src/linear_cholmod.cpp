@@ -18,12 +18,8 @@ namespace {
 struct SerialOpenMp {
 #if CHOLMOD_MAIN_VERSION < 5
   int levels = omp_get_max_active_levels();
-  SerialOpenMp() {
-    omp_set_max_active_levels(0);
-  }
-  ~SerialOpenMp() {
-    omp_set_max_active_levels(levels);
-  }
+  SerialOpenMp() { omp_set_max_active_levels(0); }
+  ~SerialOpenMp() { omp_set_max_active_levels(levels); }
 #else
   SerialOpenMp() {}
   ~SerialOpenMp() {}
@@ -167,15 +163,9 @@ class Cholmod final : public Backend {
     return result;
   }
 
-  double flops() const override {
-    return flops_;
-  }
-  double nonzeros() const override {
-    return nonzeros_;
-  }
-  const char* ordering() const override {
-    return ordering_;
-  }
+  double flops() const override { return flops_; }
+  double nonzeros() const override { return nonzeros_; }
+  const char* ordering() const override { return ordering_; }
 
  private:
   void keep_if_better(std::vector<std::int64_t> order, const char* name) {

@@ -11,8 +11,8 @@ namespace supple {
 
 namespace {
 
-constexpr double kShortest = 1.0 / 1024.0;  // of a Newton step
-constexpr double kArmijo = 1e-4;            // Nocedal and Wright (2006), eq. 3.4
+constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
+constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
 
 /// How one load step is attacked: full Newton steps, or steps that must lower the energy.
@@ -21,14 +21,15 @@ enum class Manner { Full, Guarded };
 /// Follows the path from load to load; owns what the load steps share.
 class Path {
  public:
-  Path(System& system, const Vector& start, const Vector& prescribed, const NewtonSettings& settings,
-       const Progress& progress)
+  Path(System& system, const Vector& start, const Vector& prescribed,
+       const NewtonSettings& settings, const Progress& progress)
       : system_(system), prescribed_(prescribed), settings_(settings), progress_(progress) {
     require_size("start", start.size(), system.dofs(), "one row of three for each node");
     require_size("prescribed", prescribed.size(), system.dofs(), "one row of three for each node");
     const Reduction& reduction = system_.reduction();
     is_free_ = Mask::Constant(system.dofs(), false);
-    for (const Index dof : reduction.dof) is_free_[dof] = true;
+    for (const Index dof : reduction.dof)
+      is_free_[dof] = true;
     result_.u = start;
     start_fixed_ = start;
     offset_ = Vector::Zero(system.dofs());
@@ -101,7 +102,8 @@ class Path {
 
   double free_norm(const Vector& r) const {
     double sum = 0.0;
-    for (Eigen::Index i = 0; i < r.size(); ++i) sum += is_free_[i] ? r[i] * r[i] : 0.0;
+    for (Eigen::Index i = 0; i < r.size(); ++i)
+      sum += is_free_[i] ? r[i] * r[i] : 0.0;
     return std::sqrt(sum);
   }
 
@@ -143,7 +145,7 @@ class Path {
     if (status.ok()) return Outcome::Converged;
     if (status.cause == FactorStatus::Cause::NotFinite) return Outcome::Inverted;
     if (status.cause == FactorStatus::Cause::Singular) return Outcome::Singular;
-    if (manner == Manner::Full) {  // on the way an indefinite K is no fault, at the end it is
+    if (manner == Manner::Full) { // on the way an indefinite K is no fault, at the end it is
       indefinite_ = system_.factorise_indefinite().ok();
       return indefinite_ ? Outcome::Converged : Outcome::LimitPoint;
     }
@@ -206,7 +208,7 @@ class Path {
   /// An equilibrium with an indefinite tangent is not where a body rests.
   Outcome stable(const Vector& u, double s) {
     if (!has_energy_) return Outcome::Converged;
-    if (shift_ == 0.0 && !indefinite_) return Outcome::Converged;  // K was definite one step ago
+    if (shift_ == 0.0 && !indefinite_) return Outcome::Converged; // K was definite one step ago
     system_.assemble_tangent(u, loads(s));
     if (system_.factorise().ok()) return Outcome::Converged;
     result_.negative = system_.inertia().negative;
@@ -254,11 +256,11 @@ class Path {
   NewtonResult result_;
 };
 
-}  // namespace
+} // namespace
 
 NewtonResult solve(System& system, const Vector& start, const Vector& prescribed,
                    const NewtonSettings& settings, const Progress& progress) {
   return Path(system, start, prescribed, settings, progress).run();
 }
 
-}  // namespace supple
+} // namespace supple

@@ -8,17 +8,12 @@ namespace {
 
 enum Feature { kFace = 0, kEdge = 1 };
 
-}  // namespace
+} // namespace
 
 Sliding::Sliding(std::shared_ptr<const Vector> points, std::vector<Index> nodes, Vector stiffness,
                  const Points& vertices, const Triangles& triangles, bool inverse)
-    : points_(std::move(points)),
-      nodes_(std::move(nodes)),
-      stiffness_(std::move(stiffness)),
-      vertices_(vertices),
-      triangles_(triangles),
-      surface_(vertices, triangles),
-      inverse_(inverse),
+    : points_(std::move(points)), nodes_(std::move(nodes)), stiffness_(std::move(stiffness)),
+      vertices_(vertices), triangles_(triangles), surface_(vertices, triangles), inverse_(inverse),
       cells_(static_cast<Eigen::Index>(nodes_.size()), 1) {
   require_size("stiffness", stiffness_.size(), cells_.rows(), "one value for each node");
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -63,7 +58,7 @@ Eigen::Matrix3d Sliding::stiffness_block(const Projection& at, Eigen::Index i) c
   if (inverse_) return loaded_normal_.row(i).transpose() * normal.transpose();
   if (at.feature[i] == kFace) return normal * normal.transpose();
   if (at.feature[i] != kEdge) return Eigen::Matrix3d::Identity();
-  Eigen::Index opposite = 0;  // the closest point has no weight there: the edge joins the other two
+  Eigen::Index opposite = 0; // the closest point has no weight there: the edge joins the other two
   at.barycentric.row(i).minCoeff(&opposite);
   const Eigen::Index t = at.triangle[i];
   const Eigen::Vector3d edge = vertices_.row(triangles_(t, (opposite + 2) % 3)) -
@@ -82,4 +77,4 @@ void Sliding::tangent(const ConstVector& u, double scale, const Scatter& map,
   }
 }
 
-}  // namespace supple
+} // namespace supple

@@ -23,9 +23,11 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-double factor_of(const Term& term, double load_factor) { return term.is_load ? load_factor : 1.0; }
+double factor_of(const Term& term, double load_factor) {
+  return term.is_load ? load_factor : 1.0;
+}
 
-}  // namespace
+} // namespace
 
 void System::add(std::shared_ptr<Term> term) {
   terms_.push_back(std::move(term));
@@ -60,13 +62,15 @@ Kind System::kind() const {
 
 double System::energy(const ConstVector& u, double load_factor) const {
   double total = 0.0;
-  for (const auto& term : terms_) total += factor_of(*term, load_factor) * term->energy(u);
+  for (const auto& term : terms_)
+    total += factor_of(*term, load_factor) * term->energy(u);
   return total;
 }
 
 Vector System::residual(const ConstVector& u, double load_factor) const {
   Vector r = Vector::Zero(dofs());
-  for (const auto& term : terms_) term->residual(u, factor_of(*term, load_factor), r);
+  for (const auto& term : terms_)
+    term->residual(u, factor_of(*term, load_factor), r);
   return r;
 }
 
@@ -91,7 +95,8 @@ const BlockPattern& System::pattern() {
   if (!pattern_) {
     std::vector<Connectivity> cells;
     cells.reserve(terms_.size());
-    for (const auto& term : terms_) cells.push_back(term->cells());
+    for (const auto& term : terms_)
+      cells.push_back(term->cells());
     pattern_ = std::make_unique<BlockPattern>(block_pattern(dofs() / 3, cells));
   }
   return *pattern_;
@@ -176,4 +181,4 @@ Inertia System::inertia() {
   return indefinite_->inertia();
 }
 
-}  // namespace supple
+} // namespace supple

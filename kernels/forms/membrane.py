@@ -35,7 +35,7 @@ class SurfaceKinematics(Kinematics):
         super().__init__(C=ufl.as_matrix([*rows, [0, 0, normal]]), J=ufl.as_ufl(1.0))
 
     @cached_property
-    def trace_U(self) -> Any:  # noqa: N802
+    def trace_U(self) -> Any:
         area = ufl.sqrt(ufl.det(self._in_plane))
         return ufl.sqrt(ufl.tr(self._in_plane) + 2 * area) + 1 / area
 

@@ -14,6 +14,7 @@ from types import ModuleType
 
 from .errors import SuppleError
 
+
 @cache
 def core() -> ModuleType:
     """``supple._core``.
@@ -41,7 +42,9 @@ def core() -> ModuleType:
 def _core_type() -> str | None:
     """OpenBLAS' name of the kernels for this processor, by its vector units."""
     try:
-        flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("flags", 1)[1].split("\n")[0]
+        flags = (
+            Path("/proc/cpuinfo").read_text(encoding="utf-8").split("flags", 1)[1].split("\n")[0]
+        )
     except (OSError, IndexError):
         return None
     words = set(flags.split())

@@ -66,9 +66,7 @@ class Settings:
         return native
 
 
-def solve(
-    system: Any, start: Floats, prescribed: Floats, native: Any, settings: Settings
-) -> Any:
+def solve(system: Any, start: Floats, prescribed: Floats, native: Any, settings: Settings) -> Any:
     """Run; the result's displacement is ``result.u`` (3n)."""
     if not np.isfinite(system.residual(start.ravel(), 1.0)).all():
         raise InputError(
@@ -125,13 +123,13 @@ def require_usable(rest: Rest) -> None:
         ) from None
 
 
-def worst_cells(
-    result: Any, built: Built, description: Description, count: int = 5
-) -> list[int]:
+def worst_cells(result: Any, built: Built, description: Description, count: int = 5) -> list[int]:
     """Cells of the mesh: the most compressed one, then those around the largest residual."""
     cells: list[int] = []
     if result.worst.value <= 0:
-        terms = [r for r, t in zip(description.regions, built.regions, strict=True) if t is not None]
+        terms = [
+            r for r, t in zip(description.regions, built.regions, strict=True) if t is not None
+        ]
         cells.append(int(terms[result.worst.term].ids[result.worst.cell]))
     if len(result.last_residual):
         size = np.linalg.norm(result.last_residual.reshape(-1, 3), axis=1)

@@ -26,9 +26,7 @@ def defaults(law: Law, count: int, skin: bool = False) -> dict[str, Floats]:
     return values
 
 
-def given(
-    law: Law, values: Mapping[str, Any], count: int, skin: bool = False
-) -> dict[str, Floats]:
+def given(law: Law, values: Mapping[str, Any], count: int, skin: bool = False) -> dict[str, Floats]:
     """The given values as (count, size) rows.
 
     Raises:

@@ -41,7 +41,9 @@ def require_held(mesh: Mesh, fixed: npt.NDArray[np.bool_], normals: dict[int, Fl
         if rank < 6:
             free = directions[rank]
             motion = _MOTIONS[int(np.abs(free).argmax())]
-            what = "the body" if len(piece) == len(mesh.points) else f"a piece of {len(piece)} nodes"
+            what = (
+                "the body" if len(piece) == len(mesh.points) else f"a piece of {len(piece)} nodes"
+            )
             raise InputError(
                 f"{what} is not held: nothing resists a {motion}; fix or support more nodes."
             )

@@ -7,9 +7,9 @@ namespace supple {
 
 /// What the loaded BLAS is and does.
 struct BlasReport {
-  std::string core;   ///< OpenBLAS' name of its kernels ("SkylakeX", "Prescott", …); "" elsewhere
-  std::string config; ///< OpenBLAS' build line, or ""
-  int threads = 0;    ///< threads that it may use now; 0 if unknown
+  std::string core;    ///< OpenBLAS' name of its kernels ("SkylakeX", "Prescott", …); "" elsewhere
+  std::string config;  ///< OpenBLAS' build line, or ""
+  int threads = 0;     ///< threads that it may use now; 0 if unknown
   double gflops = 0.0; ///< best of a few dgemm of 256 × 256, one thread, GFLOP/s; 0 without dgemm
 };
 

@@ -45,18 +45,19 @@ class KernelTerm final : public Term {
   const Vector& constant() const;
   /// Gather w and x of the batch of cells [first, first + lanes) and call the kernel on a zeroed A.
   void call(const supple_kernel& kernel, Index first, const ConstVector& u, Buffers& b) const;
-  /// For each batch: call the kernel, then consume(first cell, cells in the batch, A, batch number).
+  /// For each batch: call the kernel, then consume(first cell, cells in the batch, A, batch
+  /// number).
   template <class Consume>
   void each(const supple_kernel& kernel, const ConstVector& u, Consume consume) const;
 
   std::shared_ptr<const KernelLibrary> library_;
   std::shared_ptr<const Vector> points_;
   Connectivity cells_;
-  Index group_ = 1;  // cells of a batch of colouring_
+  Index group_ = 1; // cells of a batch of colouring_
   Colouring colouring_;
-  std::vector<Vector> fields_;  // by field number; "u" stays empty
+  std::vector<Vector> fields_; // by field number; "u" stays empty
   mutable Vector constant_;
   const supple_kernel *energy_, *residual_, *tangent_, *volume_ratio_;
 };
 
-}  // namespace supple
+} // namespace supple

@@ -28,4 +28,4 @@ class KernelLibrary {
   const supple_library* table_;
 };
 
-}  // namespace supple
+} // namespace supple

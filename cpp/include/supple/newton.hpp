@@ -4,8 +4,8 @@
 ///         full Newton steps, guarded: J > 0 and ψ finite             quick, for the usual case
 ///         else steps that decrease the energy, or the residual where there is none
 ///
-/// From zero the load factor scales the loads and the prescribed displacements. From another start u0
-/// the loads stay whole and R(u) − (1 − s) R(u0) = 0 is followed from s = 0, where u0 solves it.
+/// From zero the load factor scales the loads and the prescribed displacements. From another start
+/// u0 the loads stay whole and R(u) − (1 − s) R(u0) = 0 is followed from s = 0, where u0 solves it.
 #pragma once
 
 #include <functional>
@@ -17,46 +17,46 @@
 namespace supple {
 
 struct NewtonSettings {
-  double rtol = 1e-10;       ///< of max(‖external force‖, ‖reactions‖)
-  double atol = 1e-14;       ///< N
-  double step_tol = 1e-8;    ///< of `size`, on the largest entry of the Newton step
-  double size = 1.0;         ///< of the body, m
-  int max_iterations = 25;   ///< of one load step
-  int load_steps = 0;        ///< equal steps without cut-back; 0: adaptive from one
-  double smallest_step = 1.0 / 1024.0;  ///< of the load, below which an adaptive run gives up
-  bool refuse_inversion = true;         ///< J ≤ 0 at a point is refused (not for barrier laws)
-  bool warm = false;                    ///< follow from u0 as it is instead of scaling the loads
+  double rtol = 1e-10;                 ///< of max(‖external force‖, ‖reactions‖)
+  double atol = 1e-14;                 ///< N
+  double step_tol = 1e-8;              ///< of `size`, on the largest entry of the Newton step
+  double size = 1.0;                   ///< of the body, m
+  int max_iterations = 25;             ///< of one load step
+  int load_steps = 0;                  ///< equal steps without cut-back; 0: adaptive from one
+  double smallest_step = 1.0 / 1024.0; ///< of the load, below which an adaptive run gives up
+  bool refuse_inversion = true;        ///< J ≤ 0 at a point is refused (not for barrier laws)
+  bool warm = false;                   ///< follow from u0 as it is instead of scaling the loads
 };
 
 /// One Newton iteration, or the start of a load step (iteration 0).
 struct Iteration {
-  double load_factor = 0.0;  ///< that this iteration aims at
+  double load_factor = 0.0; ///< that this iteration aims at
   int iteration = 0;
-  double residual = 0.0;     ///< ‖R‖₂ on free dofs after it, N
-  double tolerance = 0.0;    ///< that it is compared with, N
-  double step = 0.0;         ///< ‖Δu‖∞, m
-  double length = 1.0;       ///< share of the Newton step that was taken
-  double shift = 0.0;        ///< added to an indefinite tangent, relative to its diagonal
+  double residual = 0.0;  ///< ‖R‖₂ on free dofs after it, N
+  double tolerance = 0.0; ///< that it is compared with, N
+  double step = 0.0;      ///< ‖Δu‖∞, m
+  double length = 1.0;    ///< share of the Newton step that was taken
+  double shift = 0.0;     ///< added to an indefinite tangent, relative to its diagonal
 };
 
 enum class Outcome {
   Converged,
-  Unstable,      ///< an equilibrium with negative stiffness: a small push leaves it
-  Inverted,      ///< no step without an inverted cell
-  Singular,      ///< the tangent has no inverse
-  LimitPoint,    ///< the tangent turned indefinite before the whole load was on
-  Stalled        ///< the residual does not fall any more
+  Unstable,   ///< an equilibrium with negative stiffness: a small push leaves it
+  Inverted,   ///< no step without an inverted cell
+  Singular,   ///< the tangent has no inverse
+  LimitPoint, ///< the tangent turned indefinite before the whole load was on
+  Stalled     ///< the residual does not fall any more
 };
 
 struct NewtonResult {
   Outcome outcome = Outcome::Converged;
-  Vector u;                        ///< (3n) at the last equilibrium found
-  double load_factor = 0.0;        ///< of that equilibrium
-  Vector residual;                 ///< (3n) at u with the whole load; reactions at fixed dofs
+  Vector u;                 ///< (3n) at the last equilibrium found
+  double load_factor = 0.0; ///< of that equilibrium
+  Vector residual;          ///< (3n) at u with the whole load; reactions at fixed dofs
   std::vector<Iteration> history;
-  VolumeRatio worst;               ///< smallest volume ratio met in the last attempt
-  Vector last_residual;            ///< (3n) of the last attempt, to find the cells at fault
-  std::int64_t negative = 0;       ///< negative eigenvalues, where the outcome is Unstable
+  VolumeRatio worst;         ///< smallest volume ratio met in the last attempt
+  Vector last_residual;      ///< (3n) of the last attempt, to find the cells at fault
+  std::int64_t negative = 0; ///< negative eigenvalues, where the outcome is Unstable
 };
 
 /// Called after each iteration; may throw to stop the solve.
@@ -68,4 +68,4 @@ using Progress = std::function<void(const Iteration&)>;
 NewtonResult solve(System& system, const Vector& start, const Vector& prescribed,
                    const NewtonSettings& settings, const Progress& progress);
 
-}  // namespace supple
+} // namespace supple

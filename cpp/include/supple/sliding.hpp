@@ -43,8 +43,8 @@ class Sliding final : public Term {
   Triangles triangles_;
   SurfaceTree surface_;
   bool inverse_;
-  Connectivity cells_;  // one node each
+  Connectivity cells_; // one node each
   Points loaded_normal_;
 };
 
-}  // namespace supple
+} // namespace supple

@@ -65,8 +65,8 @@ class System {
   std::unique_ptr<BlockPattern> pattern_;
   std::unique_ptr<Reduction> reduction_;
   std::unique_ptr<Factor> factor_, indefinite_;
-  Factor* current_ = nullptr;  // the one that factorised last
+  Factor* current_ = nullptr; // the one that factorised last
   Vector values_, reduced_;
 };
 
-}  // namespace supple
+} // namespace supple

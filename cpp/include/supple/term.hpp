@@ -11,8 +11,8 @@ namespace supple {
 /// Smallest volume ratio of a term's cells and where it is.
 struct VolumeRatio {
   double value = std::numeric_limits<double>::infinity();
-  Index cell = -1;  ///< of its term
-  Index term = -1;  ///< of the system, in the order of System::add
+  Index cell = -1; ///< of its term
+  Index term = -1; ///< of the system, in the order of System::add
 };
 
 /// What a term does with u, node-major displacements of all nodes (3n).
@@ -64,4 +64,4 @@ class NodalForce final : public Term {
   Connectivity cells_;
 };
 
-}  // namespace supple
+} // namespace supple

@@ -1,6 +1,6 @@
 """From a prone image to the tumour's place in the supine patient.
 
-    read ─► segment ─► mesh ─► model ─► (align ─► identify) ─► poses ─► locate ─► write
+read ─► segment ─► mesh ─► model ─► (align ─► identify) ─► poses ─► locate ─► write
 """
 
 from __future__ import annotations

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 @click.option("--tumour-diameter", type=float, metavar="MM", help="Of the tumour.")
 @click.option("--labels", type=click.Path(path_type=Path),
               help="Tissue labels (0 air, 1 fat, 2 gland, 3 chest, 4 tumour); else segmented.")  # fmt: skip
-@click.option("--scan", type=click.Path(path_type=Path), help="Supine surface scan (PLY, STL, OBJ).")
+@click.option(
+    "--scan", type=click.Path(path_type=Path), help="Supine surface scan (PLY, STL, OBJ)."
+)
 @click.option("--scan-unit", type=click.Choice(("mm", "cm", "m")), help="Of the scan; mm.")
 @click.option("--nipple", metavar="X,Y,Z", help="Of that breast, prone, LPS mm; else estimated.")
 @click.option("--seeds", multiple=True, metavar="TISSUE:X,Y,Z",

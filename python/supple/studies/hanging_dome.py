@@ -92,7 +92,9 @@ def run(case: Case, progress: Progress | None = None) -> Outcome:
     again = resting.solve(progress=progress)
     supine = resting.gravity((0.0, 0.0, -GRAVITY)).solve(progress=progress)
     trip = float(np.abs(again.points - mesh.points).max())
-    return Outcome(case, float(rest.points[:, 2].max()), float(supine.points[:, 2].max()), trip, 1.0)
+    return Outcome(
+        case, float(rest.points[:, 2].max()), float(supine.points[:, 2].max()), trip, 1.0
+    )
 
 
 def write(outcomes: list[Outcome], folder: Path) -> list[Path]:
