@@ -10,5 +10,6 @@
     generate    unit → C source with its kernel table
     build       C source → shared library, kept in the user's cache
 
-Only `reader`, `unit`, `cells` and `build` are needed to find a library that exists: they import neither UFL nor FFCx.
+Only `reader`, `unit`, `cells` and `build` are needed to find a library that exists: they import
+neither UFL nor FFCx.
 """

@@ -20,12 +20,14 @@ def main() -> None:
     options.add_argument("--out", type=Path, required=True)
     given = options.parse_args()
     try:
-        text = source(parse(given.unit, given.materials), given.contract.read_text())
+        text = source(
+            parse(given.unit, given.materials), given.contract.read_text(encoding="utf-8")
+        )
     except (EnergyFileError, ValueError) as problem:
         sys.exit(str(problem))
     given.out.parent.mkdir(parents=True, exist_ok=True)
     aside = given.out.with_suffix(".tmp")
-    aside.write_text(text)
+    aside.write_text(text, encoding="utf-8")
     aside.replace(given.out)
 
 

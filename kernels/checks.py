@@ -1,4 +1,4 @@
-"""What every energy must be, tried on numbers before it is compiled: scalar, objective, stress free.
+"""What every energy must be, tried on numbers before compiling: scalar, objective, stress free.
 
 The numbers come from the energy file run on numeric tensors, so nothing of UFL is involved.
 """
@@ -42,7 +42,7 @@ def stress_at(law: Law, F: np.ndarray, values: dict[str, Any], step: float = 1e-
 
 
 def stiffness_scale(law: Law, values: dict[str, Any]) -> float:
-    """Largest second difference of ψ at F = I, Pa: the scale against which stress counts as zero."""
+    """Largest second difference of ψ at F = I, Pa: beside it a stress counts as zero or not."""
     step, eye = 1e-3, np.eye(3)
     zero = energy_at(law, eye, values)
     second = 0.0
@@ -102,7 +102,7 @@ def _require_objective(law: Law, values: dict[str, Any], scale: float) -> None:
         psi, turned = (energy_at(law, Q @ F, values) for Q in (np.eye(3), random_rotation(rng)))
         if abs(psi - turned) > 1e-9 * max(scale, abs(psi)):
             raise EnergyFileError(
-                f"{law.path}:{law.line}: is not objective: a rotation changes psi from {psi:.6g} to "
-                f"{turned:.6g} Pa; write it in C, its invariants or E, or declare "
+                f"{law.path}:{law.line}: is not objective: a rotation changes psi from "
+                f"{psi:.6g} to {turned:.6g} Pa; write it in C, its invariants or E, or declare "
                 'exceptions = {"objective"}.'
             )

@@ -13,8 +13,10 @@ import ufl
 
 #: name → (Basix cell, degree, gdim is 3 for all). T and S are the facets of P and Q elements.
 CELLS = {
-    "P1": ("tetrahedron", 1), "P2": ("tetrahedron", 2), "Q1": ("hexahedron", 1), "Q2": ("hexahedron", 2),
-    "T1": ("triangle", 1), "T2": ("triangle", 2), "S1": ("quadrilateral", 1), "S2": ("quadrilateral", 2),
+    "P1": ("tetrahedron", 1), "P2": ("tetrahedron", 2),
+    "Q1": ("hexahedron", 1), "Q2": ("hexahedron", 2),
+    "T1": ("triangle", 1), "T2": ("triangle", 2),
+    "S1": ("quadrilateral", 1), "S2": ("quadrilateral", 2),
 }  # fmt: skip
 #: Degree of the stiffness' quadrature (points: 1, 4, 8, 27 and 1, 3, 4, 9).
 STIFFNESS_DEGREE = {"P1": 1, "P2": 2, "Q1": 2, "Q2": 4, "T1": 1, "T2": 2, "S1": 2, "S2": 4}
@@ -61,7 +63,7 @@ def quadrature(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (q, tdim) and weights (q,) of the default rule, on the reference cell."""
     cell = basix.CellType[CELLS[name][0]]
     points, weights = basix.make_quadrature(cell, degree)
-    return points, weights
+    return np.asarray(points), np.asarray(weights)
 
 
 def _nodal_serendipity(cell: str) -> Any:
@@ -86,6 +88,6 @@ def _nodal_serendipity(cell: str) -> Any:
             x[d].append(points)
             M[d].append(np.ones((1, 1, 1, 1)) if d < 2 else np.zeros((0, 1, 0, 1)))
     return basix.ufl.custom_element(
-        kind, (), own.wcoeffs, x, M, 0, basix.MapType.identity, basix.SobolevSpace.H1, False,
-        1, 2, basix.PolysetType.standard,
+        kind, (), np.asarray(own.wcoeffs), x, M, 0, basix.MapType.identity,
+        basix.SobolevSpace.H1, False, 1, 2, basix.PolysetType.standard,
     )  # fmt: skip

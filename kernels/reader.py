@@ -121,7 +121,8 @@ class Law:
         volumetric = self._functions["psi_vol"](J, **self.arguments("psi_vol", values))
         if not isinstance(volumetric, energy.Volumetric):
             raise EnergyFileError(
-                f"{self.path}:{self.line}: psi_vol must return a Volumetric, got {type(volumetric).__name__}; "
+                f"{self.path}:{self.line}: psi_vol must return a Volumetric, "
+                f"got {type(volumetric).__name__}; "
                 "use log_volumetric(J, bulk) or another helper of supple.energy."
             )
         return volumetric

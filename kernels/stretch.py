@@ -10,10 +10,13 @@ from ufl.constantvalue import as_ufl
 from ufl.core.ufl_type import ufl_type
 from ufl.mathfunctions import MathFunction
 
+#: What a kernel's source needs to call a `Frozen`.
+FROZEN_IN_C = "static inline double frozen(double x) { return x; }"
+
 
 @ufl_type()
 class Frozen(MathFunction):
-    """A value without a derivative; in C the function `frozen` of `generate`."""
+    """A value without a derivative; in C the function of FROZEN_IN_C."""
 
     __slots__ = ()
 

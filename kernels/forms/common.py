@@ -1,4 +1,4 @@
-"""What the forms share: a kernel as a UFL object, its fields, the measure with pinned quadrature."""
+"""What the forms share: kernels as UFL objects, their fields, the measure with its pinned rule."""
 
 from __future__ import annotations
 
@@ -34,6 +34,12 @@ def measure(space: Space, degree: int) -> Any:
         domain=space.mesh,
         metadata={"quadrature_degree": degree, "quadrature_rule": "default"},
     )
+
+
+def volume_scale(space: Space) -> Any:
+    """|det ∂x/∂ξ| of the map from the reference cell: volume per unit of quadrature weight."""
+    determinant: Any = ufl.JacobianDeterminant(space.mesh)
+    return abs(determinant)
 
 
 def at_points(space: Space, degree: int, *values: Any) -> tuple[Any, Any]:

@@ -16,7 +16,7 @@ import ufl
 from ..elements import space as make_space
 from ..kinematics import Kinematics
 from ..reader import Law
-from .common import Forms, at_points, measure
+from .common import Forms, at_points, measure, volume_scale
 
 
 def direct(law: Law, element: str, degree: int) -> Forms:
@@ -32,7 +32,7 @@ def direct(law: Law, element: str, degree: int) -> Forms:
         "residual": residual,
         "tangent": ufl.derivative(residual, space.displacement, space.trial),
         "volume_ratio": at_points(space, degree, ufl.det(F)),
-        "points": at_points(space, degree, F, P, psi, abs(ufl.JacobianDeterminant(space.mesh))),
+        "points": at_points(space, degree, F, P, psi, volume_scale(space)),
     }
     return Forms(space, {"u": space.displacement, **values}, kernels, degree)
 
@@ -48,7 +48,7 @@ def inverse(law: Law, element: str, degree: int) -> Forms:
     cauchy = ratio * P * F.T
     dx = measure(space, degree)
     residual = ufl.inner(cauchy, ufl.grad(space.test)) * dx
-    rest_volume = ratio * abs(ufl.JacobianDeterminant(space.mesh))
+    rest_volume = ratio * volume_scale(space)
     kernels = {
         "residual": residual,
         "tangent": ufl.derivative(residual, space.displacement, space.trial),

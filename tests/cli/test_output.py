@@ -49,8 +49,8 @@ def test_an_existing_folder_keeps_its_other_files(tmp_path: Path) -> None:
     folder.path("a.txt").write_text("new")
     folder.path("parts/b.txt").write_text("b")
     folder.publish()
-    assert (tmp_path / "notes.txt").read_text() == "mine"
-    assert (tmp_path / "a.txt").read_text() == "new"
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+    assert (tmp_path / "a.txt").read_text(encoding="utf-8") == "new"
     assert everything(tmp_path) == ["a.txt", "notes.txt", "parts", "parts/b.txt"]
 
 

@@ -131,8 +131,8 @@ def test_a_good_run_writes_its_files_and_the_result(
 ) -> None:
     install(good)
     assert main(["probe", "--out", str(tmp_path / "out")]) == 0
-    assert (tmp_path / "out" / "a.txt").read_text() == "a"
-    assert json.loads((tmp_path / "out" / "result.json").read_text()) == {"tip_mm": [0, None, 2]}
+    assert (tmp_path / "out" / "a.txt").read_text(encoding="utf-8") == "a"
+    assert json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8")) == {"tip_mm": [0, None, 2]}
     shown = capsys.readouterr()
     assert shown.out == f"The tip moved by 2 mm.\nwrote {tmp_path / 'out'}: a.txt, result.json\n"
     assert shown.err == ""
@@ -155,7 +155,7 @@ def test_a_doubtful_result_is_written_marked_and_exits_3(
 
     install(work)
     assert main(["probe", "--out", str(tmp_path / "out")]) == 3
-    written = json.loads((tmp_path / "out" / "result.json").read_text())
+    written = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert written["not_trustworthy"] == ["one cell is inverted"]
     assert "supple: not trustworthy: one cell is inverted\n" in capsys.readouterr().err
 

@@ -14,7 +14,7 @@ from supple.laws import _ahead
 
 @pytest.fixture(scope="module")
 def contract():
-    return (_ahead() / "kernel.h").read_text()
+    return (_ahead() / "kernel.h").read_text(encoding="utf-8")
 
 
 def source(name, contract):
@@ -29,7 +29,7 @@ def statements(text):
 def test_options_of_ffcx_in_the_working_folder_change_nothing(contract, tmp_path, monkeypatch):
     """FFCx reads ffcx_options.json where one stands; kernels must not."""
     before = statements(source("neo_hookean.P1.direct", contract))
-    (tmp_path / "ffcx_options.json").write_text('{"scalar_type": "float32", "epsilon": 0.5}')
+    (tmp_path / "ffcx_options.json").write_text('{"scalar_type": "float32", "epsilon": 0.5}', encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert statements(source("neo_hookean.P1.direct", contract)) == before
 
@@ -51,7 +51,7 @@ def test_the_table_names_unit_law_and_fields(contract):
                                   "pressure_moved.S1", "corotational_polar.P1.direct"])  # fmt: skip
 def test_generated_c_compiles_without_a_warning(name, contract, tmp_path):
     """-Wall -Werror."""
-    (tmp_path / "k.c").write_text(source(name, contract))
+    (tmp_path / "k.c").write_text(source(name, contract), encoding="utf-8")
     command = [build._compiler(), "-std=c17", "-O0", "-Wall", "-Werror", "-fPIC", "-c", "k.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

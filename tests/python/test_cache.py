@@ -50,7 +50,7 @@ print(b - a, d - c)
 def yeoh(tmp_path):
     path = tmp_path / "elsewhere" / "yeoh.py"
     path.parent.mkdir()
-    path.write_text(YEOH)
+    path.write_text(YEOH, encoding="utf-8")
     return path
 
 
@@ -113,7 +113,7 @@ def test_two_processes_at_once_and_one_killed_leave_a_usable_cache(yeoh, home):
     use(yeoh, home)
     left = next(kernels(home).glob(".compiling-*"))
     os.utime(left, (0, 0))
-    yeoh.write_text(YEOH.replace("500.0", "501.0"))
+    yeoh.write_text(YEOH.replace("500.0", "501.0"), encoding="utf-8")
     use(yeoh, home, "compile")
     assert not list(kernels(home).glob(".compiling-*"))  # the next compilation sweeps old ones
 
@@ -125,7 +125,7 @@ def cache(tmp_path):
 
     ahead = tmp_path / "ahead"
     ahead.mkdir()
-    (ahead / "kernel.h").write_text((_ahead() / "kernel.h").read_text())
+    (ahead / "kernel.h").write_text((_ahead() / "kernel.h").read_text(encoding="utf-8"))
     folder = tmp_path / "kernels"
     folder.mkdir(mode=0o700)
     unit = Unit("traction", "T1")
@@ -175,7 +175,7 @@ def test_another_energy_of_a_shipped_name_is_not_mistaken_for_it(tmp_path, monke
     """A file called neo_hookean.py with another ψ: its own kernels, not those compiled ahead."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     path = tmp_path / "neo_hookean.py"
-    text = supple.material("neo_hookean").path.read_text()
+    text = supple.material("neo_hookean").path.read_text(encoding="utf-8")
     path.write_text(
         text.replace("mu / 2 * (k.I1 - 3)", "mu / 2 * (k.I1 - 3) ** 2 + mu / 2 * (k.I1 - 3)")
     )

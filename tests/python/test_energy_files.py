@@ -84,7 +84,7 @@ COMPUTING = {
 
 def written(folder, text):
     path = folder / "mine.py"
-    path.write_text(HEAD + text)
+    path.write_text(HEAD + text, encoding="utf-8")
     return path
 
 

@@ -52,7 +52,7 @@ def test_vtu_round_trip_keeps_everything_and_names_frame_and_unit(mesh, tmp_path
     for name, tag in mesh.tags.items():
         assert back.tags[name].kind == tag.kind
         np.testing.assert_array_equal(back.tags[name].ids, tag.ids)
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert 'Name="frame: LPS"' in text
     assert 'Name="unit: m"' in text
     assert [p.name for p in tmp_path.iterdir()] == ["m.vtu"]

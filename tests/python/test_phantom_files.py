@@ -35,7 +35,7 @@ def files(solved: Solved, tmp_path_factory: pytest.TempPathFactory) -> PatientFi
 
 @pytest.fixture(scope="module")
 def truth(files: PatientFiles) -> dict:
-    return json.loads(files.truth.read_text())
+    return json.loads(files.truth.read_text(encoding="utf-8"))
 
 
 def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -47,7 +47,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def test_case_names_the_files_and_the_prone_tumour(files: PatientFiles, truth: dict) -> None:
     """The case holds what the truth says of the prone pose, and nothing of the supine one."""
-    case = tomllib.loads(files.case.read_text())
+    case = tomllib.loads(files.case.read_text(encoding="utf-8"))
     assert (files.case.parent / case["image"]["file"]) == files.image
     assert (files.case.parent / case["image"]["labels"]) == files.labels
     assert (files.case.parent / case["scan"]["file"]) == files.scan
@@ -123,7 +123,7 @@ def test_same_seed_gives_the_same_files_and_another_seed_others(tmp_path: Path) 
         content = getattr(first, name).read_bytes()
         assert getattr(again, name).read_bytes() == content
         assert getattr(other, name).read_bytes() != content
-    assert "labels" not in tomllib.loads(first.case.read_text())["image"]
+    assert "labels" not in tomllib.loads(first.case.read_text(encoding="utf-8"))["image"]
 
 
 def test_failed_writing_leaves_no_file(

@@ -139,7 +139,7 @@ def test_a_failed_check_is_on_the_first_screen(tmp_path: Path) -> None:
     good = report_data().result
     bad = Result(**{**vars(good), "checks": {"J > 0": Check(False, -0.2)}})
     write_report(tmp_path / "x.html", report_data(result=bad))
-    first = (tmp_path / "x.html").read_text().split('class="view"')[0]
+    first = (tmp_path / "x.html").read_text(encoding="utf-8").split('class="view"')[0]
     assert "Do not rely on this result" in first
     assert "J &gt; 0" in first
 
@@ -175,7 +175,7 @@ def test_a_plane_cuts_a_tetrahedron_in_a_triangle_of_known_sides() -> None:
 
 def test_parts_that_are_not_there_are_left_out(tmp_path: Path) -> None:
     write_report(tmp_path / "x.html", report_data(gland=None, chest=None, scan=None))
-    text = own((tmp_path / "x.html").read_text())
+    text = own((tmp_path / "x.html").read_text(encoding="utf-8"))
     assert text.count("<label hidden>") == 3
 
 

@@ -119,7 +119,7 @@ def test_the_skin_carries_the_nipple() -> None:
 
 def test_the_file_holds_the_keys_of_the_design(tmp_path: Path) -> None:
     result(skin_mae_mm=1.2).write(tmp_path / "result.json")
-    read = json.loads((tmp_path / "result.json").read_text())
+    read = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert read["tumour"]["prone_mm"] == pytest.approx([50, -100, 10])
     assert read["tumour"]["supine_mm"] == pytest.approx([60, -50, 30])
     assert read["tumour"]["depth_mm"] == pytest.approx(30)
@@ -148,7 +148,7 @@ def test_a_figure_that_is_no_number_leaves_the_old_file(tmp_path: Path) -> None:
     path.write_text("old")
     with pytest.raises(InputError, match="finite"):
         result(skin_mae_mm=float("nan")).write(path)
-    assert path.read_text() == "old"
+    assert path.read_text(encoding="utf-8") == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
 
 

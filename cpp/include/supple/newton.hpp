@@ -23,7 +23,7 @@ struct NewtonSettings {
   double size = 1.0;                   ///< of the body, m
   int max_iterations = 25;             ///< of one load step
   int load_steps = 0;                  ///< equal steps without cut-back; 0: adaptive from one
-  double smallest_step = 1.0 / 1024.0; ///< of the load, below which an adaptive run gives up
+  double smallest_step = 1.0 / 256.0; ///< of the load, below which an adaptive run gives up
   bool refuse_inversion = true;        ///< J ≤ 0 at a point is refused (not for barrier laws)
   bool warm = false;                   ///< follow from u0 as it is instead of scaling the loads
 };

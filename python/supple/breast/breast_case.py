@@ -1,223 +1,258 @@
-"""What a prediction is asked for: a case file, or an image and the options of the command."""
+"""What a prediction is asked for: a case file, or an image and options; checked before any work.
+
+[image]    file = "prone.mha", labels = "labels.mha"
+[tumour]   centre_mm = [x, y, z] LPS, diameter_mm = 12, nipple_mm = [x, y, z]
+[scan]     file = "supine.ply", unit = "mm"
+[pose]     image = "prone", target = "supine"
+[nipple]   centre_mm = [x, y, z] prone
+[seeds]    air, fat, gland, chest = [[x, y, z], ...] mm
+[material.breast]  law, density, softest, and the law's parameters;  gland, tumour: parameters
+[material.skin]    young, thickness
+[support]  chest = "fixed" or "sliding"
+[mesh]     edge_mm
+[identify] parameters = ["breast.young", "skin.young"], method, seed, evaluations, workers
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from supple import parameters
+from supple.breast.identify import METHODS, IdentifySettings
 from supple.breast.model import SUPPORTS, Materials
 from supple.breast.tissues import Tissue
 from supple.case import Table, read_case
 from supple.errors import InputError
+from supple.files import METRES
+from supple.laws import read_law
 
 Point = tuple[float, float, float]
-#: Parameters that a scan can identify, and those that it does.
-IDENTIFIABLE = ("breast.young", "skin.young")
-
-
-@dataclass(frozen=True)
-class Identify:
-    """How parameters are found from a scan."""
-
-    parameters: tuple[str, ...] = IDENTIFIABLE
-    method: str = "cma-es"
-    seed: int = 1
-    evaluations: int = 40
+#: Assumed where a case gives no diameter, mm.
+DIAMETER = 10.0
 
 
 @dataclass(frozen=True)
 class Case:
-    """One patient; places in LPS mm, as everywhere at the door.
+    """One prediction, as it is asked for.
 
     Attributes:
-        image: prone MRI: a file, or a folder or archive of a DICOM series.
-        tumour_mm: centre in the prone image.
-        diameter_mm: of the tumour; None: no cells are tumour beyond the labels.
-        labels: label image of `Tissue` codes; None: the image is segmented.
-        scan: supine surface scan; None: no alignment, no identification.
-        scan_unit: of the scan.
-        nipple_mm: of the breast with the tumour, prone; None: estimated.
-        seeds: points known to be in a tissue, for the segmentation.
-        edge_mm: longest edge of the mesh; None: the mesher's choice.
-        support: "fixed" or "sliding" chest wall.
+        image: prone image.
+        tumour_mm: centre in the image, LPS mm.
+        tumour_diameter_mm: its diameter; None where it is not known.
+        labels: label image; None to segment the image.
+        scan: supine surface; None to use the materials as they are.
+        scan_unit: its unit of length.
+        nipple_mm: prone nipple of the breast with the tumour; None to estimate it.
+        seeds: points known to be in a tissue, mm.
+        materials: laws and parameters, where the identification starts.
+        softest: make the tissue as soft as it can be.
+        support: of the chest wall.
+        edge_mm: of the mesh; None for one of a usual size.
+        identify: how; None without a scan.
+        title: what the user calls it.
     """
 
     image: Path
     tumour_mm: Point
-    diameter_mm: float | None = None
+    tumour_diameter_mm: float | None = None
     labels: Path | None = None
     scan: Path | None = None
     scan_unit: str = "mm"
     nipple_mm: Point | None = None
-    seeds: Mapping[Tissue, Sequence[Point]] = field(default_factory=dict)
-    edge_mm: float | None = None
-    support: str = "fixed"
+    seeds: dict[Tissue, list[Point]] = field(default_factory=dict)
     materials: Materials = field(default_factory=Materials)
-    identify: Identify = field(default_factory=Identify)
-
-    def checked(self) -> Case:
-        """Itself, after its files were seen to exist.
-
-        Raises:
-            InputError: a file that is missing, named with its role.
-        """
-        for role in ("image", "labels", "scan"):
-            path = getattr(self, role)
-            if path is not None and not path.exists():
-                raise InputError(f"{role} {path} does not exist; check the path.")
-        return self
+    softest: bool = False
+    support: str = "fixed"
+    edge_mm: float | None = None
+    identify: IdentifySettings = field(default_factory=IdentifySettings)
+    title: str = ""
 
 
-def read_breast_case(path: str | Path, allow_energy_files: bool = False) -> Case:
-    """Read a case.toml; DESIGN §9 shows one. Paths are relative to its folder.
+def read_breast_case(path: str | Path, *, allow_energy_files: bool = False) -> Case:
+    """Read a case file.
 
     Raises:
-        InputError: a wrong or unknown key (the nearest is named), a missing file.
+        InputError: a key is missing, unknown or wrong, a file does not exist, a law or a parameter
+            is not known or out of bounds, an energy file is named and not allowed.
     """
-    table = read_case(path)
-    image, tumour = table.required("image"), table.required("tumour")
+    top = read_case(path)
+    image, tumour = top.required("image"), top.required("tumour")
+    scan, model = top.table("scan"), top.table("model")
+    materials, softest = _materials(top.table("material"), allow_energy_files)
     case = Case(
         image=image.path("file"),
         labels=image.path("labels") if "labels" in image else None,
         tumour_mm=_point(tumour, "centre_mm"),
-        diameter_mm=tumour.number("diameter_mm", above=0.0) if "diameter_mm" in tumour else None,
+        tumour_diameter_mm=_diameter(tumour),
+        scan=None if scan is None else scan.path("file"),
+        scan_unit="mm" if scan is None else scan.text("unit", "mm", choices=tuple(METRES)),
         nipple_mm=_point(tumour, "nipple_mm") if "nipple_mm" in tumour else None,
+        seeds=_seeds(top.table("seeds")),
+        materials=materials,
+        softest=softest,
+        support=SUPPORTS[0] if model is None else _support(model),
+        edge_mm=_edge(model) if model is not None else None,
+        identify=_identify(top.table("identify"), materials),
+        title=Path(path).name,
     )
-    case = _scan(case, table.table("scan"))
-    _pose(table.table("pose"))
-    case = _model(case, table.table("model"))
-    case = replace(case, materials=_materials(table.table("material"), allow_energy_files))
-    case = replace(case, identify=_identify(table.table("identify")))
-    for known in (image, tumour, table):
-        known.done()
-    return case.checked()
+    _check_pose(top.table("pose"))
+    for table in filter(None, (image, tumour, scan, model, top)):
+        table.done()
+    return case
 
 
 def with_options(case: Case, **options: Any) -> Case:
-    """The case with those options of the command that were given (not None)."""
-    return replace(case, **{k: v for k, v in options.items() if v is not None}).checked()
+    """The case with what was given on the command line in place of what it says itself."""
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in ("image", "labels", "scan"):
+        path = given.get(name)
+        if path is not None and not path.exists():
+            raise InputError(f"{name} {path} does not exist; give an existing path.")
+    diameter = given.get("tumour_diameter_mm")
+    if diameter is not None and not 1.0 <= diameter <= 150.0:
+        raise InputError(f"the tumour's diameter must be 1 to 150 mm, got {diameter:g}.")
+    return replace(case, **given)
 
 
-def parse_seeds(words: Sequence[str]) -> dict[Tissue, list[Point]]:
-    """``fat:x,y,z`` and so on, LPS mm, to points by tissue.
-
-    Raises:
-        InputError: an unknown tissue or something that is no point.
-    """
-    seeds: dict[Tissue, list[Point]] = {}
-    for word in words:
-        name, _, place = word.partition(":")
-        known = {t.name.lower(): t for t in Tissue if t is not Tissue.TUMOUR}
-        if name.lower() not in known:
-            raise InputError(f"seeds must be {'|'.join(known)}:x,y,z in LPS mm, got {word!r}.")
-        seeds.setdefault(known[name.lower()], []).append(parse_point("seeds", place))
-    return seeds
-
-
-def parse_point(option: str, text: str) -> Point:
-    """``x,y,z`` in LPS mm.
-
-    Raises:
-        InputError: not three numbers.
-    """
+def parse_point(text: str, name: str) -> Point:
+    """The three numbers of X,Y,Z."""
     try:
-        x, y, z = (float(word) for word in text.split(","))
+        x, y, z = (float(part) for part in text.split(","))
     except ValueError:
         raise InputError(
-            f"{option} must be three numbers x,y,z in LPS mm, got {text!r}; "
-            "for example --tumour=-62,-140.5,12."
+            f"{name} must be X,Y,Z in mm such as -62,-140.5,12, got {text!r}."
         ) from None
+    if not all(abs(value) < 1e4 for value in (x, y, z)):
+        raise InputError(f"{name} must be three finite coordinates in mm, got {text!r}.")
     return x, y, z
+
+
+def parse_seeds(texts: tuple[str, ...]) -> dict[Tissue, list[Point]]:
+    """Seeds written as TISSUE:X,Y,Z."""
+    seeds: dict[Tissue, list[Point]] = {}
+    for text in texts:
+        name, _, place = text.partition(":")
+        known = [t.name.lower() for t in Tissue if t != Tissue.TUMOUR]
+        if name not in known:
+            raise InputError(
+                f"--seeds must be TISSUE:X,Y,Z with a tissue of {', '.join(known)}, got {text!r}."
+            )
+        seeds.setdefault(Tissue[name.upper()], []).append(parse_point(place, "--seeds"))
+    return seeds
 
 
 def _point(table: Table, key: str) -> Point:
     x, y, z = table.vector(key)
-    return float(x), float(y), float(z)
+    return x, y, z
 
 
-def _scan(case: Case, scan: Table | None) -> Case:
-    if scan is None:
-        return case
-    unit = scan.text("unit", "mm", choices=("mm", "m", "cm"))
-    case = replace(case, scan=scan.path("file"), scan_unit=unit)
-    scan.done()
-    return case
+def _diameter(table: Table) -> float | None:
+    key = "diameter_mm"
+    return table.number(key, above=1.0, below=150.0) if key in table else None
 
 
-def _pose(pose: Table | None) -> None:
-    if pose is None:
-        return
-    pose.text("image", "prone", choices=("prone",))
-    pose.text("target", "supine", choices=("supine",))
-    pose.done()
+def _check_pose(table: Table | None) -> None:
+    if table is not None:
+        table.text("image", "prone", choices=("prone",))
+        table.text("target", "supine", choices=("supine",))
+        table.done()
 
 
-def _model(case: Case, model: Table | None) -> Case:
-    if model is None:
-        return case
-    edge = model.number("edge_mm", above=0.0) if "edge_mm" in model else None
-    support = model.text("support", "fixed", choices=SUPPORTS)
-    model.done()
-    return replace(case, edge_mm=edge, support=support)
+def _support(model: Table) -> str:
+    return model.text("support", SUPPORTS[0], choices=SUPPORTS)
 
 
-def _materials(table: Table | None, allow_energy_files: bool) -> Materials:
-    made = Materials()
+def _edge(model: Table) -> float | None:
+    return model.number("edge_mm", above=2.0, below=60.0) if "edge_mm" in model else None
+
+
+def _seeds(table: Table | None) -> dict[Tissue, list[Point]]:
+    seeds: dict[Tissue, list[Point]] = {}
     if table is None:
-        return made
+        return seeds
+    for tissue in (Tissue.AIR, Tissue.FAT, Tissue.GLAND, Tissue.CHEST):
+        key = tissue.name.lower()
+        if key not in table:
+            continue
+        given = table.value(key)
+        if not isinstance(given, list):
+            raise table.wrong(key, "a list of points [x, y, z] in mm", given)
+        points = [Table({key: point}, table.file, table.name).vector(key) for point in given]
+        seeds[tissue] = [(x, y, z) for x, y, z in points]
+    table.done()
+    return seeds
+
+
+def _materials(table: Table | None, allow_energy_files: bool) -> tuple[Materials, bool]:
+    made, is_softest = Materials(), False
+    if table is None:
+        return made, is_softest
     breast, skin = table.table("breast"), table.table("skin")
     if breast is not None:
-        law = _law(breast, made.law, allow_energy_files)
-        density = breast.number("density", made.density, above=0.0)
-        own = dict(made.breast) if law == made.law else {}
-        values = {**own, **_numbers(breast, law)}
+        law = _law(breast, allow_energy_files)
+        density = breast.number("density", made.density, above=0.0, below=1e5)
+        is_softest = breast.flag("softest", False)
+        known = {p.name for p in read_law(law).parameters}
+        usual = {name: value for name, value in made.breast.items() if name in known}
+        values = usual | _law_values(breast, law)
         made = replace(made, law=law, density=density, breast=values)
-        breast.done()
-    for part in ("gland", "tumour"):
-        given = table.table(part)
-        if given is not None:
-            made = replace(made, **{part: _numbers(given, made.law)})
-            given.done()
     if skin is not None:
-        law = _law(skin, made.skin_law, allow_energy_files)
-        thickness = skin.number("thickness", made.thickness, above=0.0)
-        own = dict(made.skin) if law == made.skin_law else {}
-        values = {**own, **_numbers(skin, law)}
-        made = replace(made, skin_law=law, thickness=thickness, skin=values)
-        skin.done()
+        thickness = skin.number("thickness", made.thickness, above=0.0, below=0.05)
+        values = {**made.skin, **_law_values(skin, made.skin_law, skin=True)}
+        made = replace(made, thickness=thickness, skin=values)
+    gland, tumour = (_part(table, part, made.law) for part in ("gland", "tumour"))
     table.done()
-    return made
+    return replace(made, gland=gland, tumour=tumour), is_softest
 
 
-def _law(table: Table, default: str, allow_energy_files: bool) -> str:
-    law = table.text("law", default)
-    if law.endswith(".py"):
+def _part(table: Table, name: str, law: str) -> dict[str, float]:
+    part = table.table(name)
+    return {} if part is None else _law_values(part, law)
+
+
+def _law_values(table: Table, law: str, skin: bool = False) -> dict[str, float]:
+    read = read_law(law)
+    values: dict[str, float] = table.numbers([p.name for p in read.parameters])
+    table.done()
+    with table.named():
+        parameters.given(read, values, 1, skin)
+    return values
+
+
+def _law(table: Table, allow_energy_files: bool) -> str:
+    law = table.text("law", Materials().law)
+    if law.endswith(".py") or "/" in law or "\\" in law:
         if not allow_energy_files:
-            raise table.wrong("law", "a shipped energy, or --allow-energy-files for a file", law)
+            raise InputError(
+                f"{table.at('law')} names an energy file, {law}, which would be compiled and run; "
+                "read it, then allow it with --allow-energy-files."
+            )
         return str(table.path("law"))
+    with table.named("law"):
+        read_law(law)
     return law
 
 
-def _numbers(table: Table, law: str) -> dict[str, Any]:
-    from supple.laws import material
-
-    return table.numbers([p.name for p in material(law).parameters])
-
-
-def _identify(table: Table | None) -> Identify:
-    made = Identify()
+def _identify(table: Table | None, materials: Materials) -> IdentifySettings:
+    usual = IdentifySettings()
     if table is None:
-        return made
-    names = table.value("parameters") if "parameters" in table else list(made.parameters)
-    if not isinstance(names, list) or not names or not set(names) <= set(IDENTIFIABLE):
-        raise table.wrong("parameters", f"a list of {', '.join(IDENTIFIABLE)}", names)
-    made = Identify(
-        tuple(names),
-        table.text("method", made.method, choices=("cma-es",)),
-        table.integer("seed", made.seed),
-        table.integer("evaluations", made.evaluations, minimum=4),
+        known = {"skin.young", *(f"breast.{name}" for name in materials.breast)}
+        return replace(usual, parameters=tuple(n for n in usual.parameters if n in known))
+    names = table.value("parameters") if "parameters" in table else list(usual.parameters)
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise table.wrong("parameters", 'a list of names such as "breast.young"', names)
+    for name in names:
+        with table.named("parameters"):
+            materials.of(name)
+    settings = replace(
+        usual,
+        parameters=tuple(names),
+        method=table.text("method", usual.method, choices=METHODS),
+        seed=table.integer("seed", usual.seed, minimum=1),
+        evaluations=table.integer("evaluations", usual.evaluations, minimum=7),
+        workers=table.integer("workers", usual.workers, minimum=1),
     )
     table.done()
-    return made
+    return settings

@@ -165,7 +165,7 @@ def identify(
         materials.of(name)
     with _evaluator(s.workers, (mesh, materials, support, misfit, s)) as evaluate:
         trials = _search(evaluate, s, watch)
-    return _conclude(trials, materials, s, _skin_area(mesh, misfit))
+    return _conclude(trials, materials, s, _skin_area(mesh))
 
 
 def _search(
@@ -233,8 +233,8 @@ def _spread(trials: list[Trial], best: Trial, area: float) -> tuple[Floats, str]
     return np.sqrt(np.diag(covariance)), f"{reason} mm patch of skin"
 
 
-def _skin_area(mesh: BreastMesh, misfit: SkinMisfit) -> float:
-    """Area of the model's skin that the scan shows, m²: its triangles nearest to a scan point."""
+def _skin_area(mesh: BreastMesh) -> float:
+    """Area of the model's prone skin, m²."""
     a, b, c = (mesh.points[mesh.skin[:, i]] for i in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
@@ -262,9 +262,10 @@ def _evaluator(
         search = Search(*parts)
         yield lambda xs: [search(x) for x in xs]
         return
-    with _one_thread(), ProcessPoolExecutor(
-        workers, get_context("spawn"), _start_worker, (parts,)
-    ) as pool:
+    with (
+        _one_thread(),
+        ProcessPoolExecutor(workers, get_context("spawn"), _start_worker, (parts,)) as pool,
+    ):
         yield lambda xs: list(pool.map(_run_worker, xs))
 
 

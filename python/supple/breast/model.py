@@ -82,7 +82,8 @@ class Materials:
     def described(self) -> str:
         """The breast's parameters in words."""
         units = {p.name: p.unit for p in supple.material(self.law).parameters}
-        values = (f"{k} {v:.4g} {units.get(k, '')}".removesuffix(" 1") for k, v in self.breast.items())
+        values = [f"{k} {v:.4g} {units.get(k, '')}" for k, v in self.breast.items()]
+        values = [text.removesuffix(" 1").rstrip() for text in values]
         return f"a breast of {self.law} with {', '.join(values)}"
 
     def _times(self, part: str, keys: set[str], factor: float) -> Materials:

