@@ -3,8 +3,9 @@
     cases → solve, several times, interleaved → check the tip → results.md and .json in --out
 
 Box 80 × 15 × 15 m clamped at x = 0, dead traction (0, -10, 0) Pa on x = 80, E = 3 kPa, ν = 0.3, one
-load step from zero to 1e-10. The tips are DOLFINx 0.11's and FEBio 4's, which agree to 6 digits. Times
-are medians of the repeats and count only beside another code's in the same run on the same machine.
+load step from zero to 1e-10. The tips are DOLFINx 0.11's and FEBio 4's, which agree to 6 digits.
+Times are medians of the repeats and count only beside another code's in the same run on the same
+machine.
 """
 
 from __future__ import annotations
@@ -99,7 +100,9 @@ def table(rows: list[Row], machine: str) -> str:
         "",
         machine,
         "",
-        "| element, law | dofs | iterations | tip error | assembly | factor | solve | total ms/iteration |",
+        "Phases in ms per iteration.",
+        "",
+        "| element, law | dofs | iterations | tip error | assembly | factor | solve | total |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for r in rows:

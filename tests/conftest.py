@@ -44,7 +44,8 @@ def compiled_units(request: pytest.FixtureRequest) -> None:
         {
             item.callspec.params["unit"]
             for item in request.session.items
-            if "unit" in getattr(getattr(item, "callspec", None), "params", {})
+            if "compiled_units" in getattr(item, "fixturenames", ())
+            and "unit" in getattr(getattr(item, "callspec", None), "params", {})
         }
     )
     halves = [subprocess.Popen([sys.executable, "-c", _COMPILE, *names[k::2]]) for k in (0, 1)]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from . import newton, parameters, supports, terms
 from .errors import InputError
 from .laws import read_law
-from .mesh_tags import Where
+from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
 from .state import Rest, State, outcome
 
@@ -80,7 +80,7 @@ class Body:
 
     # Laws and parameters
 
-    def region(self, cells: Where, material: str | Path, **values: Any) -> Body:
+    def region(self, cells: CellWhere, material: str | Path, **values: Any) -> Body:
         """Another law on some cells: a mask, ids or a tag. Values as in the constructor."""
         d, law = self._description, read_law(material)
         ids = self.mesh.cell_ids(cells)
@@ -93,7 +93,7 @@ class Body:
         d.regions.append(new)
         return self._restructured()
 
-    def set(self, where: Where | None = None, **values: Any) -> Body:
+    def set(self, where: CellWhere | None = None, **values: Any) -> Body:
         """New parameters, scalars or one a chosen cell (all cells if ``where`` is None)."""
         chosen = np.arange(len(self.mesh.cells)) if where is None else self.mesh.cell_ids(where)
         changes = []  # all checked before the first is made
@@ -185,7 +185,7 @@ class Body:
         return self
 
     def traction(self, where: Where, traction: npt.ArrayLike, per: str = "rest") -> Body:
-        """Add a dead traction (3,) Pa on the facets of ``where``, per area at "rest" or "loaded"."""
+        """Add a dead traction (3,) Pa on the facets of ``where``, per "rest" or "loaded" area."""
         if per not in ("rest", "loaded"):
             raise InputError(f'per must be "rest" or "loaded", got {per!r}.')
         load = terms.FacetLoad(self.mesh.boundary(where), _vector("traction", traction), per)

@@ -19,7 +19,7 @@ class MaterialError(InputError):
 
 
 class MeshError(InputError):
-    """A mesh or a surface is wrong: inverted or duplicate cells, NaN, unknown element, no such tag."""
+    """A mesh or a surface is wrong: inverted or duplicate cells, NaN, no such element or tag."""
 
 
 class ConvergenceError(SuppleError):

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from supple import mesh_box, mesh_checks, mesh_jacobian, mesh_topology
 from supple.errors import InputError, MeshError
 from supple.kernels.cells import FACETS, Element
-from supple.mesh_tags import Tag, Where, chosen, find_tag
+from supple.mesh_tags import CellWhere, Tag, Where, chosen, find_tag
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -161,7 +161,7 @@ class Mesh:
             return chosen(mask, len(self.points), "nodes")
         return chosen(where, len(self.points), "nodes")
 
-    def cell_ids(self, where: npt.ArrayLike | str) -> Ints:
+    def cell_ids(self, where: CellWhere) -> Ints:
         """Sorted ids (k,) of the cells that a mask (c,), ids or a tag of cells choose."""
         if isinstance(where, str):
             tag = find_tag(self.tags, where)

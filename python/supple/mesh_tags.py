@@ -19,6 +19,8 @@ Kind = Literal["points", "cells", "facets"]
 
 #: callable(points (n, 3) m) -> mask (n,) | node ids | mask (n,) | tag name
 Where = Callable[[Floats], npt.ArrayLike] | npt.ArrayLike | str
+#: ids | mask (c,) | tag name
+CellWhere = npt.ArrayLike | str
 
 
 @dataclass(frozen=True, eq=False)

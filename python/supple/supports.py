@@ -1,4 +1,4 @@
-"""Supports: whether they hold the body at all, and how a region's compliance is shared by its nodes."""
+"""Supports: whether they hold the body, and how a region's compliance is shared by its nodes."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
     regions, gravity, tractions, pressures, skins, sliding supports, nodal forces → _core.System
 
-Structure (which terms on which cells) and values (parameters, loads) are apart: new values reach the
-terms that exist, so pattern, reduction and symbolic factor live as long as the structure.
+Structure (which terms on which cells) and values (parameters, loads) are apart: new values reach
+the terms that exist, so pattern, reduction and symbolic factor live as long as the structure.
 """
 
 from __future__ import annotations

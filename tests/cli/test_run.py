@@ -132,7 +132,8 @@ def test_a_good_run_writes_its_files_and_the_result(
     install(good)
     assert main(["probe", "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out" / "a.txt").read_text(encoding="utf-8") == "a"
-    assert json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8")) == {"tip_mm": [0, None, 2]}
+    written = (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
+    assert json.loads(written) == {"tip_mm": [0, None, 2]}
     shown = capsys.readouterr()
     assert shown.out == f"The tip moved by 2 mm.\nwrote {tmp_path / 'out'}: a.txt, result.json\n"
     assert shown.err == ""

@@ -101,9 +101,9 @@ def test_tables_of_one_name_are_counted_from_one(tmp_path: Path) -> None:
 
 def test_an_error_of_the_library_is_pointed_at_the_key_and_keeps_its_kind(tmp_path: Path) -> None:
     top = case(tmp_path, "")
-    with pytest.raises(MeshError, match=r"case\.toml: mesh: Cell 3 is inverted\."):  # noqa: SIM117
-        with top.named("mesh"):
-            raise MeshError("Cell 3 is inverted.")
+    message = r"case\.toml: mesh: Cell 3 is inverted\."
+    with pytest.raises(MeshError, match=message), top.named("mesh"):
+        raise MeshError("Cell 3 is inverted.")
 
 
 def test_a_file_that_is_no_case_is_refused(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 
 def result(**changes: object) -> Result:
     tumour = Tumour.locate([0.05, -0.1, 0.01], [0.06, -0.05, 0.03], [0.05, -0.09, 0.0], skin())
-    given = {
+    given: dict[str, Any] = {
         "tumour": tumour,
         "parameters": {"breast.young": Parameter(1000.0, "Pa")},
         "mesh": MeshFigures(100, 400, 0.3, 512.0),
@@ -38,7 +39,7 @@ def result(**changes: object) -> Result:
         "versions": {"supple": "0.1"},
         **changes,
     }
-    return Result(**given)  # type: ignore[arg-type]
+    return Result(**given)
 
 
 def skin() -> tuple[np.ndarray, np.ndarray]:

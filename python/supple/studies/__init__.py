@@ -1,1 +1,1 @@
-"""Studies: cases with a published or independent answer, as commands that write table and figure."""
+"""Studies: cases with a published or independent answer; each command writes table and figure."""

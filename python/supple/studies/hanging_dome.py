@@ -3,8 +3,8 @@
     dome → body → rest shape → prone again → supine → table and figure
 
 The dome is the prone shape: z ≤ 6 mm + (depth - 6 mm) sqrt(1 - (r / 65 mm)²) over a clamped base
-z = 0; prone gravity is +z, supine -z; neo-Hookean, ν = 0.45, 1000 kg/m³, 4,800 P1 tetrahedra; a skin
-of 2 mm on all but the base. The depths to compare with were found with DOLFINx.
+z = 0; prone gravity is +z, supine -z; neo-Hookean, ν = 0.45, 1000 kg/m³, 4,800 P1 tetrahedra; a
+skin of 2 mm on all but the base. The depths to compare with were found with DOLFINx.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def _draw(outcomes: list[Outcome], path: Path) -> None:
         other = [1e3 * (getattr(o.case, field) or np.nan) for o in outcomes]
         axes.plot(places, found, "o", color=colour, label=f"{field}, Supple")
         axes.plot(places, other, "s", mfc="none", ms=11, color=colour, label=f"{field}, DOLFINx")
-    for place, o in zip(places, outcomes, strict=True):
+    for place, o in enumerate(outcomes):
         if o.rest is None:
             text = f"no rest shape:\nends at {100 * o.reached:.0f} %\nof gravity"
             axes.text(place, 55, text, ha="center", fontsize=8)
