@@ -14,6 +14,7 @@ namespace {
 constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
+constexpr int kPatience = 4; // times more iterations where each is sure to lower the energy
 
 /// How one load step is attacked: full Newton steps, or steps that must lower the energy.
 enum class Manner { Full, Guarded };
@@ -161,7 +162,10 @@ class Path {
     const double first = free_norm(r);
     double norm = first, best = std::numeric_limits<double>::infinity();
     record(s, 0, norm, tolerance(u, r, s), 0.0, 1.0);
-    for (int k = 1; k <= settings_.max_iterations; ++k) {
+    // Steps that lower an energy cannot run away: cutting the load instead would lose their ground.
+    const bool descends = manner == Manner::Guarded && has_energy_;
+    const int limit = descends ? kPatience * settings_.max_iterations : settings_.max_iterations;
+    for (int k = 1; k <= limit; ++k) {
       const Outcome factored = factorise(u, s, manner);
       if (factored != Outcome::Converged) return factored;
       Vector d = missing(u, s);

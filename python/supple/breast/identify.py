@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from supple.breast.model import Materials, build_body, set_materials
-from supple.breast.poses import Poses, solve_poses
+from supple.breast.poses import IMPATIENCE, Poses, solve_poses
 from supple.breast.skin_misfit import SkinMisfit, mean_absolute
 from supple.errors import ConvergenceError, InputError
 
@@ -122,7 +122,9 @@ class Search:
         materials = moved(self._start, self._settings.parameters, x)
         set_materials(self._body, materials, self._mesh.tissue)
         try:
-            poses = solve_poses(self._body, self._last, rtol=self._settings.rtol)
+            poses = solve_poses(
+                self._body, self._last, rtol=self._settings.rtol, patience=IMPATIENCE
+            )
         except ConvergenceError as error:
             return Trial(x, BARRIER * (2.0 - error.load_factor), None)
         self._last = poses

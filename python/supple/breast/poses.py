@@ -30,8 +30,8 @@ GRAVITY = 9.81
 PRONE, SUPINE = (0.0, -GRAVITY, 0.0), (0.0, GRAVITY, 0.0)
 #: Of a pose: 1e-8 of the forces leaves less than a micrometre in a breast.
 RTOL = 1e-8
-#: Newton iterations after which a rest shape or a pose is given up.
-PATIENCE = 60
+#: Newton iterations after which a shape is given up, and after which one of many trials is.
+PATIENCE, IMPATIENCE = 300, 60
 #: Times stiffer that are tried for a body too soft to have a rest shape.
 STIFFER = (1.25, 1.6, 2.0, 3.0, 5.0, 10.0)
 
@@ -96,7 +96,11 @@ class Poses:
 
 
 def solve_poses(
-    body: supple.Body, start: Poses | None = None, watch: Watch | None = None, rtol: float = RTOL
+    body: supple.Body,
+    start: Poses | None = None,
+    watch: Watch | None = None,
+    rtol: float = RTOL,
+    patience: int = PATIENCE,
 ) -> Poses:
     """Rest and supine shape of a prone body.
 
@@ -105,27 +109,31 @@ def solve_poses(
         start: the same body with other parameters, whose supine shape is near; speeds up.
         watch: told the stage ("rest" or "supine") and the share of the load that is on.
         rtol: as in `Body.solve`.
+        patience: Newton iterations after which a shape is given up.
 
     Raises:
         ConvergenceError: there is no rest shape, or no supine one, with the cause.
     """
     body.gravity(PRONE)
-    rest = body.rest_shape(rtol=rtol, progress=_progress("rest", watch))
+    rest = body.rest_shape(rtol=rtol, progress=_progress("rest", watch, patience))
     loaded = body.on(rest.mesh).gravity(SUPINE)
-    return Poses(body, rest, _supine(loaded, start, watch, rtol))
+    return Poses(body, rest, _supine(loaded, start, watch, rtol, patience))
 
 
-def _supine(body: supple.Body, start: Poses | None, watch: Watch | None, rtol: float) -> State:
-    report = _progress("supine", watch)
+def _supine(
+    body: supple.Body, start: Poses | None, watch: Watch | None, rtol: float, patience: int
+) -> State:
     if start is not None:
         try:
-            return body.solve(start=start.supine, rtol=rtol, progress=report)
+            return body.solve(
+                start=start.supine, rtol=rtol, progress=_progress("supine", watch, IMPATIENCE)
+            )
         except SuppleError:  # too far off, cells would be inverted: from the rest shape then
             pass
-    return body.solve(rtol=rtol, progress=_progress("supine", watch))
+    return body.solve(rtol=rtol, progress=_progress("supine", watch, patience))
 
 
-def _progress(stage: str, watch: Watch | None) -> Callable[[dict[str, float]], None]:
+def _progress(stage: str, watch: Watch | None, patience: int) -> Callable[[dict[str, float]], None]:
     """A hook that reports the load and gives a hopeless solve up."""
     count = 0
 
@@ -134,12 +142,12 @@ def _progress(stage: str, watch: Watch | None) -> Callable[[dict[str, float]], N
         count += 1
         if watch is not None:
             watch(stage, iteration["load_factor"])
-        if count > PATIENCE:
+        if count > patience:
             raise ConvergenceError(
-                f"no {stage} shape: given up after {PATIENCE} iterations at "
+                f"no {stage} shape: given up after {patience} iterations at "
                 f"{100 * iteration['load_factor']:.0f} % of gravity; give a stiffer breast.",
                 load_factor=iteration["load_factor"],
-                cause=f"no {stage} shape was found in {PATIENCE} iterations",
+                cause=f"no {stage} shape was found in {patience} iterations",
             )
 
     return report
@@ -166,7 +174,7 @@ def _advised(
     for factor in STIFFER:
         stiffer = materials.stiffer(factor)
         try:
-            solve_poses(build_body(mesh, stiffer, support))
+            solve_poses(build_body(mesh, stiffer, support), patience=IMPATIENCE)
         except ConvergenceError:
             continue
         advice = f"a breast {factor:g} times stiffer has both shapes ({stiffer.described()})"
@@ -194,7 +202,8 @@ def softest(mesh: BreastMesh, materials: Materials, support: str, rounds: int = 
     for _ in range(rounds):
         middle = 0.5 * (works + fails)
         try:
-            solve_poses(build_body(mesh, materials.stiffer(float(np.exp(middle))), support))
+            body = build_body(mesh, materials.stiffer(float(np.exp(middle))), support)
+            solve_poses(body, patience=IMPATIENCE)
         except ConvergenceError:
             fails = middle
         else:

@@ -55,10 +55,10 @@ class RegionSettings:
     least_share: float = 0.4
     least_top: float = 15.0
     reach_share: float = 0.45
-    reach: tuple[float, float] = (20.0, 50.0)
+    reach: tuple[float, float] = (60.0, 60.0)
     between: float = 60.0
-    behind: float = 30.0
-    sheet: float = 5.0
+    behind: float = 60.0
+    sheet: float = 3.0
     crevice: float = 8.0
     bridge: float = 16.0
     least_part: float = 0.05
