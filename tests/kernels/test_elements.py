@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from supple.kernels import elements
 from supple.kernels.cells import ELEMENTS, FACETS
 

@@ -6,9 +6,9 @@ import re
 import subprocess
 
 import pytest
-from supple.kernels import build, generate, unit
 
 from supple import material
+from supple.kernels import build, generate, unit
 from supple.laws import _ahead
 
 
@@ -29,7 +29,8 @@ def statements(text):
 def test_options_of_ffcx_in_the_working_folder_change_nothing(contract, tmp_path, monkeypatch):
     """FFCx reads ffcx_options.json where one stands; kernels must not."""
     before = statements(source("neo_hookean.P1.direct", contract))
-    (tmp_path / "ffcx_options.json").write_text('{"scalar_type": "float32", "epsilon": 0.5}', encoding="utf-8")
+    options = '{"scalar_type": "float32", "epsilon": 0.5}'
+    (tmp_path / "ffcx_options.json").write_text(options, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert statements(source("neo_hookean.P1.direct", contract)) == before
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from supple.kernels import energy
 from supple.kernels.kinematics import Kinematics
 from supple.kernels.tensors import Tensor

@@ -1,4 +1,4 @@
-"""The breast as a body: values by tissue, supports, poses of a hanging dome, points carried along."""
+"""The breast as a body: values by tissue, supports, poses of a hanging dome, carried points."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_prone_hangs_and_supine_sinks_and_the_round_trip_closes(mesh: BreastMesh
 
 
 def test_a_point_is_carried_by_its_cell_as_an_affine_map_carries_it(mesh: BreastMesh) -> None:
-    """Barycentric coordinates are invariant under x -> A x + b, so the answer is A p + b exactly."""
+    """Barycentric coordinates do not change under x -> A x + b: the answer is A p + b."""
     point = np.array([0.011, -0.021, -0.007])
     carried = MaterialPoint.at(point, mesh.points, mesh.cells)
     A, b = np.array([[1.1, 0.2, 0.0], [0.0, 0.9, 0.1], [0.3, 0.0, 1.2]]), np.array([1.0, 2.0, 3.0])
@@ -92,9 +92,9 @@ def test_a_point_is_carried_by_its_cell_as_an_affine_map_carries_it(mesh: Breast
     assert carried.weights.min() >= 0
 
 
-def test_a_breast_far_too_soft_fails_and_says_how_stiff_one_would_do(mesh: BreastMesh) -> None:
-    soft = Materials(breast={"young": 150.0, "poisson": 0.45}, skin={"young": 10.0})
+def test_a_breast_far_too_soft_fails_and_says_how_stiff_one_would_do() -> None:
+    soft = Materials(breast={"young": 100.0, "poisson": 0.45})
     with pytest.raises(ConvergenceError, match="times stiffer has both shapes") as error:
-        solve_or_advise(mesh, soft, "fixed")
+        solve_or_advise(dome(depth=0.08), soft, "fixed")
     assert error.value.cause
     assert 0 <= error.value.load_factor < 1

@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 
 import pytest
-from supple.kernels import build
-from supple.kernels.unit import Unit
 
 import supple
+from supple.kernels import build
+from supple.kernels.unit import Unit
 
 YEOH = '''"""Yeoh solid, nearly incompressible. Yeoh (1990), Rubber Chem. Technol. 63, eq. 3."""
 
@@ -125,7 +125,8 @@ def cache(tmp_path):
 
     ahead = tmp_path / "ahead"
     ahead.mkdir()
-    (ahead / "kernel.h").write_text((_ahead() / "kernel.h").read_text(encoding="utf-8"))
+    contract = (_ahead() / "kernel.h").read_text(encoding="utf-8")
+    (ahead / "kernel.h").write_text(contract, encoding="utf-8")
     folder = tmp_path / "kernels"
     folder.mkdir(mode=0o700)
     unit = Unit("traction", "T1")

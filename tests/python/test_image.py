@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import SimpleITK as sitk
 
-sitk = pytest.importorskip("SimpleITK")
-
-from supple.breast.image import read_image, read_labels  # noqa: E402
-from supple.errors import InputError  # noqa: E402
+from supple.breast.image import read_image, read_labels
+from supple.errors import InputError
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 #: Columns are the directions of a sagittal acquisition: slices run right to left.

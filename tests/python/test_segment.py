@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import SimpleITK as sitk
 
-sitk = pytest.importorskip("SimpleITK")
-
-from supple.breast.image import read_image  # noqa: E402
-from supple.breast.segment import segment  # noqa: E402
-from supple.breast.tissues import Tissue  # noqa: E402
-from supple.errors import InputError  # noqa: E402
+from supple.breast.image import read_image
+from supple.breast.segment import segment
+from supple.breast.tissues import Tissue
+from supple.errors import InputError
 
 MRI = Path(__file__).resolve().parents[3] / "shared" / "data" / "mri_mimbcd"
 #: Centre x and semi-axes x, y, z of each breast; y of its base; mm.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from supple.kernels.cells import ELEMENTS
 
 import supple
+from supple.kernels.cells import ELEMENTS
 from supple.supports import node_shares, pieces, require_held
 
 MESH = supple.Mesh.box((2, 2, 2), (1.0, 2.0, 3.0), "P1")

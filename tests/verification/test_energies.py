@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from supple.kernels import checks, reader
 
 import supple
+from supple.kernels import checks, reader
 
 LAWS = [material.name for material in supple.materials()]
 F = np.array([[1.1, 0.2, 0.0], [0.1, 0.9, 0.15], [-0.05, 0.1, 1.2]])

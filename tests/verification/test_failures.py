@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from supple.kernels.cells import ELEMENTS
 
 import supple
+from supple.kernels.cells import ELEMENTS
 
 
 def block(element="P1", young=1e3, poisson=0.45, cells=(2, 2, 4)):
@@ -99,7 +99,10 @@ def test_euler_column_that_buckles_is_unstable():
     mesh = supple.Mesh.box((2, 2, 10), (0.01, 0.01, 0.2), "Q2")
     body = supple.Body(mesh, "neo_hookean", young=1e6, poisson=0.0)
     euler = np.pi**2 * 1e6 * (0.01**4 / 12) / (2 * 0.2) ** 2
-    top = lambda p: p[:, 2] > 0.2 - 1e-9  # noqa: E731
+
+    def top(p):
+        return p[:, 2] > 0.2 - 1e-9
+
     body.fix(lambda p: p[:, 2] < 1e-9)
     for share in (0.9, 4.0):
         body.clear_loads().traction(top, (0.0, 0.0, -share * euler / 1e-4))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from supple.kernels.cells import ELEMENTS
 
 import supple
+from supple.kernels.cells import ELEMENTS
 
 A = np.array([[0.2, 0.1, -0.05], [0.0, -0.1, 0.1], [0.05, 0.0, 0.15]])
-ALL = lambda p: p[:, 0] > -9  # noqa: E731
+
+
+def everywhere(p):
+    return p[:, 0] > -9
 
 
 def displaced(points, seed=1):
@@ -40,7 +43,7 @@ def facet_area(mesh, points):
 def test_pressure_on_a_closed_surface_has_no_resultant(element, distorted):
     """∮ p n da = 0 on any closed surface, moved or not."""
     mesh = distorted(element, (2, 1, 1))
-    body = loads_only(mesh).pressure(ALL, 50.0)
+    body = loads_only(mesh).pressure(everywhere, 50.0)
     for u in (np.zeros_like(mesh.points), displaced(mesh.points)):
         force = supple.assemble(body, u)[1]
         assert abs(force).max() > 1
@@ -51,7 +54,7 @@ def test_pressure_on_a_closed_surface_has_no_resultant(element, distorted):
 def test_pressure_is_the_slope_of_pressure_times_volume(element, distorted, assert_slope):
     """Work of a pressure p on a closed surface is -p dV: R·d = p dV/dd, V of the curved cells."""
     mesh = distorted(element, (2, 1, 1))
-    body = loads_only(mesh).pressure(ALL, 50.0)
+    body = loads_only(mesh).pressure(everywhere, 50.0)
     u = displaced(mesh.points)
     d = np.random.default_rng(2).uniform(-1, 1, u.shape)
     slope = (supple.assemble(body, u)[1] * d).sum()
@@ -70,9 +73,9 @@ def test_tangent_of_a_load_that_moves_is_its_derivative(
     mesh = distorted(element, (2, 1, 1))
     body = supple.Body(mesh, "neo_hookean", young=1e-3, density=900.0).gravity((1.0, -9.0, 2.0))
     if load == "pressure":
-        body.pressure(ALL, 50.0)
+        body.pressure(everywhere, 50.0)
     else:
-        body.traction(ALL, (10.0, -20.0, 30.0), per="rest" if inverse else "loaded")
+        body.traction(everywhere, (10.0, -20.0, 30.0), per="rest" if inverse else "loaded")
     system = body._system(inverse).system
     u = displaced(mesh.points).ravel()
     d = np.random.default_rng(2).uniform(-1, 1, u.size)
@@ -116,8 +119,9 @@ def test_everything_on_the_loaded_shape_is_the_direct_problem_read_backwards(ele
     """Law, skin, gravity, tractions, pressure and nodal forces: the very same nodal residual."""
     rest = distorted(element, (2, 1, 1))
     body = supple.Body(rest, "neo_hookean", young=1e3, density=900.0).gravity((1.0, -9.0, 2.0))
-    body.skin(ALL, "neo_hookean", thickness=2e-2, young=5e3).pressure(ALL, 50.0)
-    body.traction(ALL, (10.0, -20.0, 30.0)).traction(ALL, (5.0, 5.0, 0.0), per="loaded")
+    body.skin(everywhere, "neo_hookean", thickness=2e-2, young=5e3).pressure(everywhere, 50.0)
+    body.traction(everywhere, (10.0, -20.0, 30.0))
+    body.traction(everywhere, (5.0, 5.0, 0.0), per="loaded")
     body.force([0, 3], (1.0, 2.0, 3.0))
     u = displaced(rest.points)
     direct = supple.assemble(body, u)[1]

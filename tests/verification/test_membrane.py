@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from supple.kernels.cells import ELEMENTS
 
 import supple
+from supple.kernels.cells import ELEMENTS
 
 YOUNG, THICKNESS = 6e3, 2e-3
 MU = YOUNG / 3  # incompressible

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from supple.kernels.cells import ELEMENTS
 
 import supple
+from supple.kernels.cells import ELEMENTS
 
 A = np.array([[0.2, 0.1, -0.05], [0.0, -0.15, 0.1], [0.05, 0.0, 0.25]])
 F = np.eye(3) + A

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from supple.kernels.cells import ELEMENTS
 
 import supple
+from supple.kernels.cells import ELEMENTS
 
 EDGE = 0.1
 
@@ -19,9 +19,11 @@ def loaded_block(element):
     def top(p):
         return p[:, 2] > EDGE - 1e-9
 
+    def top_and_side(p):
+        return top(p) | (abs(p[:, 0] - EDGE) < 1e-9)
+
     body.fix(lambda p: p[:, 2] < 1e-9).gravity((0.0, 0.0, 3.0)).traction(top, (30.0, 0.0, 200.0))
-    where = lambda p: top(p) | (abs(p[:, 0] - EDGE) < 1e-9)  # noqa: E731
-    return body.skin(where, "neo_hookean", thickness=2e-3, young=5e3)
+    return body.skin(top_and_side, "neo_hookean", thickness=2e-3, young=5e3)
 
 
 def largest_strain(state):
@@ -56,11 +58,14 @@ def test_other_loads_make_the_round_trip_too(load):
     mesh = supple.Mesh.box((2, 2, 2), (EDGE,) * 3, "Q1")
     body = supple.Body(mesh, "neo_hookean", density=1000.0, young=1e3, poisson=0.45)
     body.fix(lambda p: p[:, 2] < 1e-9).gravity((0.0, 2.0, 5.0))
-    side = lambda p: p[:, 2] > EDGE - 1e-9  # noqa: E731
+
+    def top(p):
+        return p[:, 2] > EDGE - 1e-9
+
     if load == "pressure":
-        body.pressure(side, -150.0)
+        body.pressure(top, -150.0)
     else:
-        body.traction(side, (50.0, 0.0, 100.0), per="loaded")
+        body.traction(top, (50.0, 0.0, 100.0), per="loaded")
     rest = body.rest_shape()
     assert abs(rest.u).max() > 0.1 * EDGE
     again = body.on(rest.mesh).solve()

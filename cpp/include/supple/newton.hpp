@@ -17,12 +17,12 @@
 namespace supple {
 
 struct NewtonSettings {
-  double rtol = 1e-10;                ///< of max(‖external force‖, ‖reactions‖)
-  double atol = 1e-14;                ///< N
-  double step_tol = 1e-8;             ///< of `size`, on the largest entry of the Newton step
-  double size = 1.0;                  ///< of the body, m
-  int max_iterations = 25;  ///< of one load step; four times as many where each lowers the energy
-  int load_steps = 0;                 ///< equal steps without cut-back; 0: adaptive from one
+  double rtol = 1e-10;     ///< of max(‖external force‖, ‖reactions‖)
+  double atol = 1e-14;     ///< N
+  double step_tol = 1e-8;  ///< of `size`, on the largest entry of the Newton step
+  double size = 1.0;       ///< of the body, m
+  int max_iterations = 25; ///< of one load step; four times as many where each lowers the energy
+  int load_steps = 0;      ///< equal steps without cut-back; 0: adaptive from one
   double smallest_step = 1.0 / 256.0; ///< of the load, below which an adaptive run gives up
   bool refuse_inversion = true;       ///< J ≤ 0 at a point is refused (not for barrier laws)
   bool warm = false;                  ///< follow from u0 as it is instead of scaling the loads

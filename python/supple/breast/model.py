@@ -88,11 +88,11 @@ class Materials:
 
     def _times(self, part: str, keys: set[str], factor: float) -> Materials:
         parts = ("breast", "gland", "tumour") if part == "breast" else (part,)
-        changed = {}
+        changed: dict[str, Any] = {}
         for name in parts:
             old: Mapping[str, float] = getattr(self, name)
             changed[name] = {k: v * factor if k in keys else v for k, v in old.items()}
-        return replace(self, **changed)  # type: ignore[arg-type]
+        return replace(self, **changed)
 
 
 def build_body(

@@ -69,7 +69,7 @@ def check(o: Outcome) -> dict[str, Check]:
     f = fidelity(o.mesh, o.anatomy.labels, o.case.tumour_mm)
     least = o.poses.least_volume_ratio()
     trip = o.poses.round_trip_mm()
-    volume = float(f["volume_error"])
+    volume = float(f["segmented_error"])
     checks = {
         "cells_positive": Check(bool(f["positive"] == 1.0), float(f["positive"])),
         "mesh_volume_within_3_percent": Check(abs(volume) <= VOLUME, volume),

@@ -73,7 +73,7 @@
     const letters = ["R", "L", "A", "P", "I", "S"], x = [], y = [], z = [];
     letters.forEach((_, n) => {
       const p = middle.slice(), c = n >> 1;
-      if (c === 2) p[1] = box.lo[1];
+      if (c === 2) { p[0] += n % 2 ? 9 : -9; p[1] = box.lo[1]; } // side by side when seen from the feet
       if (c === 1) { p[0] = box.hi[0] - 6; p[2] = box.lo[2] + 6; }
       p[c] = n % 2 ? box.hi[c] - 6 : box.lo[c] + 6;
       x.push(p[0]); y.push(p[1]); z.push(p[2]);
