@@ -10,7 +10,7 @@ function(add_unit unit)
   set(source ${CMAKE_BINARY_DIR}/kernels/${unit}.c)
   add_custom_command(
     OUTPUT ${source}
-    COMMAND ${CMAKE_COMMAND} -E env PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=${CMAKE_SOURCE_DIR}
+    COMMAND ${CMAKE_COMMAND} -E env PYTHONDONTWRITEBYTECODE=1 PYTHONHASHSEED=0 PYTHONPATH=${CMAKE_SOURCE_DIR}
             ${Python_EXECUTABLE} -m kernels ${unit} --materials ${CMAKE_SOURCE_DIR}/materials
             --contract ${contract} --out ${source}
     DEPENDS ${generator} ${contract} ${ARGN}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import locale
 import tarfile
 import zipfile
 from pathlib import Path
@@ -106,6 +107,14 @@ def test_dicom_folder_gives_pixels_position_and_no_tag(tmp_path, capfd):
     sitk.WriteImage(prone.image, str(tmp_path / "out.mha"))
     assert b"Doe" not in (tmp_path / "out.mha").read_bytes()
     assert capfd.readouterr() == ("", "")
+
+
+def test_reading_dicom_leaves_the_locale_as_it_was(tmp_path):
+    """GDCM sets the C locale; files opened afterwards must not turn to ASCII."""
+    folder = write_dicom(tmp_path / "series")
+    locale.setlocale(locale.LC_CTYPE, "C.UTF-8")
+    read_image(folder)
+    assert locale.setlocale(locale.LC_CTYPE) == "C.UTF-8"
 
 
 def test_largest_of_several_series_is_taken_and_said(tmp_path):

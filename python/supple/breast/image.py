@@ -5,6 +5,7 @@ file, folder or archive ─► plausible on disk ─► pixels ─► three axes
 
 from __future__ import annotations
 
+import locale
 import re
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -103,8 +104,14 @@ def _check_exists(name: str, path: Path) -> None:
 
 @contextmanager
 def _silent(name: str, path: Path) -> Iterator[None]:
-    """ITK's messages off, its exceptions turned into one sentence."""
-    shown = sitk.ProcessObject.GetGlobalWarningDisplay()
+    """ITK's messages off, its exceptions turned into one sentence, its change of locale undone.
+
+    GDCM leaves the process in the C locale, in which files opened later would be read as ASCII.
+    """
+    shown, characters = (
+        sitk.ProcessObject.GetGlobalWarningDisplay(),
+        locale.setlocale(locale.LC_CTYPE),
+    )
     sitk.ProcessObject.SetGlobalWarningDisplay(False)
     try:
         yield
@@ -117,6 +124,7 @@ def _silent(name: str, path: Path) -> Iterator[None]:
         ) from None
     finally:
         sitk.ProcessObject.SetGlobalWarningDisplay(shown)
+        locale.setlocale(locale.LC_CTYPE, characters)
 
 
 def _read_file(name: str, path: Path) -> sitk.Image:
