@@ -220,3 +220,12 @@ def test_version_is_the_one_of_the_package(root: Path, capsys: pytest.CaptureFix
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"supple {supple.__version__}\n"
     assert f'version = "{supple.__version__}"' in (root / "pyproject.toml").read_text("utf-8")
+
+
+def test_the_help_of_solve_shows_each_table_of_a_case_on_a_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["solve", "--help"]) == 0
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert any(line.startswith("[mesh.box]") for line in lines)
+    assert any(line.startswith("[gravity]") for line in lines)

@@ -9,8 +9,8 @@ not exist the cost is a barrier. Mazier 2022, §5.4; Hansen (2016), arXiv:1604.0
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 METHODS = ("cma-es",)
 #: Cost of parameters without a rest shape, m, and more the less of gravity was reached.
 BARRIER = 0.1
+#: Seconds after which one generation's workers are given up as lost.
+TIMEOUT = 600.0
 #: Errors of the model are alike over this length of skin, m: it counts as one observation.
 CORRELATION = 30e-3
 
@@ -246,6 +248,7 @@ _worker: Search | None = None
 
 def _start_worker(parts: tuple[BreastMesh, Materials, str, SkinMisfit, IdentifySettings]) -> None:
     global _worker
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
     _worker = Search(*parts)
 
 
@@ -266,9 +269,9 @@ def _evaluator(
         return
     with (
         _one_thread(),
-        ProcessPoolExecutor(workers, get_context("spawn"), _start_worker, (parts,)) as pool,
+        get_context("spawn").Pool(workers, _start_worker, (parts,)) as pool,  # ends them, always
     ):
-        yield lambda xs: list(pool.map(_run_worker, xs))
+        yield lambda xs: pool.map_async(_run_worker, xs, chunksize=1).get(TIMEOUT)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,9 @@ def command(work: Callable[..., None]) -> click.Command:
             work(run, **given)
         return run.exit_code
 
-    named = click.command(work.__name__.replace("_", "-"))
+    # A raw docstring spells click's mark for lines to keep, the backspace, as two characters.
+    text = inspect.cleandoc(work.__doc__ or "").replace("\\b\n", "\b\n")
+    named = click.command(work.__name__.replace("_", "-"), help=text)
     folder = click.option("--out", type=click.Path(path_type=Path), help="Folder for the results.")
     machine = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
     return named(folder(machine(invoke)))
