@@ -3,6 +3,7 @@
     tensors     operations on UFL expressions and on numbers alike
     energy      the words that an energy file may use
     kinematics  what `k` offers: F, C, invariants, stretch tensor
+    law         a strain energy as read: parameters and functions
     reader      an energy file, read with ast and checked before it runs
     elements    Basix elements and the pinned quadrature
     forms/      weak forms: volume, loads, membrane

@@ -38,6 +38,12 @@ READING = {
     "while": (PSI + "    while young:\n        young = 1\n" + GOOD, 2, "While is not allowed"),
     "for": (PSI + "    for i in range(3):\n        young = i\n" + GOOD, 2, "For is not allowed"),
     "if": (PSI + "    if young > 1:\n        young = 1\n" + GOOD, 2, "If is not allowed"),
+    "endless power": (PSI + "    return young * 2 ** 2 ** 40\n", 2, "exponent must be at most 64"),
+    "endless range": (
+        PSI + "    return young * sum(i for i in range(10**12))\n",
+        2,
+        "range takes whole numbers",
+    ),
     "string": (PSI + "    return young * 'x'\n", 2, "'x' is not a number"),
     "lambda": (PSI + "    return (lambda: young)()\n", 2, "Lambda is not allowed"),
     "comparison": (PSI + "    return young * (k.J > 1)\n", 2, "Compare is not allowed"),
