@@ -189,7 +189,8 @@ class _Checker:
 
     def range(self, node: ast.Call) -> None:
         ends = [n.value for n in node.args if isinstance(n, ast.Constant)]
-        if len(ends) != len(node.args) or any(not -1 <= n <= LONGEST_RANGE for n in ends):
+        small = [n for n in ends if isinstance(n, int) and 0 <= n <= LONGEST_RANGE]
+        if len(small) != len(node.args):
             raise self.fail(node, f"range takes whole numbers up to {LONGEST_RANGE}.")
 
     def attribute(self, node: ast.Attribute) -> None:

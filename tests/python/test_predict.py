@@ -157,3 +157,17 @@ def test_with_a_scan_the_tumour_is_found_to_a_fifth_of_the_rigid_error(
     result = replace(result, truth=compare(result, patient.truth))
     assert not shortfalls(result)
     assert result.parameters["breast.young"].sd is not None
+
+
+def test_a_nipple_off_the_skin_or_of_the_other_breast_is_refused(
+    patient: PatientFiles, tmp_path: Path
+) -> None:
+    case = replace(read_breast_case(patient.case), scan=None)
+    far = replace(case, nipple_mm=(900.0, 2.0, 3.0))
+    with pytest.raises(InputError, match="nipple must lie on the breast's skin"):
+        predict(far, lambda name: tmp_path / name)
+    truth = json.loads(patient.truth.read_text(encoding="utf-8"))
+    other = "left" if truth["tumour"]["side"] == "right" else "right"
+    place = tuple(truth["nipples"][other]["prone_mm"])
+    with pytest.raises(InputError, match="nipple must be of the breast with the tumour"):
+        predict(replace(case, nipple_mm=place), lambda name: tmp_path / name)

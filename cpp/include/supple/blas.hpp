@@ -10,7 +10,7 @@ struct BlasReport {
   std::string core;    ///< OpenBLAS' name of its kernels ("SkylakeX", "Prescott", …); "" elsewhere
   std::string config;  ///< OpenBLAS' build line, or ""
   int threads = 0;     ///< threads that it may use now; 0 if unknown
-  double gflops = 0.0; ///< best of a few dgemm of 256 × 256, one thread, GFLOP/s; 0 without dgemm
+  double gflops = 0.0; ///< best of a few dgemm of 256 × 256, one thread, GFLOP/s
 };
 
 /// Look at the BLAS that this library is linked to. The speed is measured once per process (≈ 20

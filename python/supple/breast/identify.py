@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import signal
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -175,7 +176,9 @@ def identify(
 def _search(
     evaluate: Evaluate, s: IdentifySettings, watch: Callable[[float], None] | None
 ) -> list[Trial]:
-    import cma
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # cma tells that it cannot plot
+        import cma
 
     low, high = np.log(s.bounds)
     options = {

@@ -32,7 +32,7 @@ from supple.breast.identify import Identified, identify
 from supple.breast.image import read_image, read_labels
 from supple.breast.model import Materials, build_body
 from supple.breast.poses import Poses, softest, solve_or_advise
-from supple.breast.result import Result
+from supple.breast.result import Result, breast_side, closest_on_skin
 from supple.breast.segment import segment
 from supple.breast.skin_misfit import SkinMisfit
 from supple.breast.tetra import BreastMesh, build_mesh
@@ -50,6 +50,8 @@ Place = Callable[[str], Path]
 Watch = Callable[[str, float | None], None]
 #: How far from breast tissue a tumour's centre may lie, mm.
 NEAR = 3.0
+#: How far from the skin a given nipple may lie, mm.
+NIPPLE = 15.0
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,7 @@ def predict(case: Case, place: Place, watch: Watch = lambda stage, share: None) 
             anatomy.labels, edge_mm=case.edge_mm, tumour_mm=case.tumour_mm,
             tumour_diameter_mm=case.tumour_diameter_mm or DIAMETER,
         )  # fmt: skip
+    require_nipple(case, mesh)
     materials = _checked(case, mesh)
     registered, identified = None, None
     if scan is not None:
@@ -182,6 +185,28 @@ def require_in_breast(labels: sitk.Image, point: Point) -> None:
             f"the tumour must lie in the breast, got {_written(point)}, {away:.0f} mm from its"
             f" tissue in an image of {_box(low, high)}: give its centre in LPS mm, or better labels"
             " or seeds."
+        )
+
+
+def require_nipple(case: Case, mesh: BreastMesh) -> None:
+    """Refuse a given nipple that is not on the skin of the breast with the tumour.
+
+    Raises:
+        InputError: how far off it is, or that it is the other breast's.
+    """
+    if case.nipple_mm is None:
+        return
+    away, _ = closest_on_skin(1e-3 * np.array(case.nipple_mm), mesh.points, mesh.skin)
+    if 1e3 * away > NIPPLE:
+        raise InputError(
+            f"the nipple must lie on the breast's skin, got {_written(case.nipple_mm)}, "
+            f"{1e3 * away:.0f} mm from it: give its place in the prone image in LPS mm."
+        )
+    middle = 5e2 * float(mesh.points[:, 0].min() + mesh.points[:, 0].max())
+    if breast_side(case.nipple_mm, middle) != breast_side(case.tumour_mm, middle):
+        raise InputError(
+            f"the nipple must be of the breast with the tumour, got {_written(case.nipple_mm)} "
+            "on the other side: give that breast's."
         )
 
 
