@@ -50,8 +50,8 @@ def rows(parameter: Parameter, value: Any, count: int, skin: bool = False) -> Fl
     array = per_cell(name, value, count, size)
     if not kind.admits(array):
         raise MaterialError(
-            f"{name} must lie in {kind.range()} {kind.unit}, got {_worst(kind, array):g}; "
-            f"its default is {parameter.default}."
+            f"{name} must lie in {kind.range()}{_unit(kind)}, got {_worst(kind, array):g}; "
+            f"its law's own default is {parameter.default}."
         )
     return array
 
@@ -71,6 +71,10 @@ def per_cell(name: str, value: Any, count: int, size: int = 1) -> Floats:
     if array.shape not in (single, every):
         raise InputError(f"{name} must have shape {single} or {every}, got {array.shape}.")
     return np.ascontiguousarray(np.broadcast_to(array, every).reshape(count, size))
+
+
+def _unit(kind: Any) -> str:
+    return "" if kind.unit == "1" else f" {kind.unit}"
 
 
 def _worst(kind: Any, array: Floats) -> float:

@@ -142,7 +142,7 @@ def check_unit(extent: float, unit: str, source: object) -> None:
     if low <= extent <= high:
         raise InputError(
             f"{source} spans {extent:.4g} {unit}, which is no body: it is in {other}; "
-            f"pass unit='{other}'."
+            f"pass unit='{other}', or --scan-unit {other} on the command line."
         )
 
 

@@ -42,7 +42,10 @@ def test_parameters_of_neo_hookean_are_youngs_and_poissons():
         (lambda: supple.Body(MESH, "neo_hookean", yuong=1.0), "yuong; did you mean young"),
         (lambda: supple.Body(MESH, "mooney_rivlin", poisson=0.3), "there are bulk, c1, c2"),
         (lambda: supple.Body(MESH, "neo_hookean", poisson=0.5), r"poisson must lie in \(-1, 0.5\)"),
-        (lambda: supple.Body(MESH, "neo_hookean", poisson=-1.0), r"got -1; its default is 0.3"),
+        (
+            lambda: supple.Body(MESH, "neo_hookean", poisson=-1.0),
+            r"got -1; its law's own default is 0.3",
+        ),
         (lambda: supple.Body(MESH, "neo_hookean", young=0.0), r"young must lie in \(0, inf\) Pa"),
         (lambda: supple.Body(MESH, "neo_hookean", young=-3.0), "got -3"),
         (lambda: supple.Body(MESH, "neo_hookean", young=np.nan), "got nan"),

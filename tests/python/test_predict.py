@@ -14,7 +14,13 @@ import supple
 from supple.breast.breast_case import Case, parse_point, parse_seeds, read_breast_case
 from supple.breast.demo import compare, shortfalls
 from supple.breast.phantom import PatientFiles, make_patient
-from supple.breast.predict import predict, require_in_breast, require_inside
+from supple.breast.predict import (
+    predict,
+    require_in_breast,
+    require_inside,
+    require_nipple,
+)
+from supple.breast.tetra import BreastMesh
 from supple.breast.tissues import Tissue
 from supple.errors import InputError
 
@@ -159,15 +165,16 @@ def test_with_a_scan_the_tumour_is_found_to_a_fifth_of_the_rigid_error(
     assert result.parameters["breast.young"].sd is not None
 
 
-def test_a_nipple_off_the_skin_or_of_the_other_breast_is_refused(
-    patient: PatientFiles, tmp_path: Path
-) -> None:
-    case = replace(read_breast_case(patient.case), scan=None)
-    far = replace(case, nipple_mm=(900.0, 2.0, 3.0))
-    with pytest.raises(InputError, match="nipple must lie on the breast's skin"):
-        predict(far, lambda name: tmp_path / name)
-    truth = json.loads(patient.truth.read_text(encoding="utf-8"))
-    other = "left" if truth["tumour"]["side"] == "right" else "right"
-    place = tuple(truth["nipples"][other]["prone_mm"])
-    with pytest.raises(InputError, match="nipple must be of the breast with the tumour"):
-        predict(replace(case, nipple_mm=place), lambda name: tmp_path / name)
+def test_a_nipple_off_the_skin_or_of_the_other_breast_is_refused() -> None:
+    """Two skin triangles, 0.1 m to either side of the midline: one is the right breast's."""
+    corner = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.0, 0.02]])
+    points = np.vstack([corner + shift for shift in ([-0.11, 0, 0], [0.09, 0, 0])])
+    skin, none = np.arange(6, dtype=np.int32).reshape(2, 3), np.empty((0, 3), np.int32)
+    mesh = BreastMesh(points, np.empty((0, 4), np.int32), np.empty(0, np.uint8), skin, none, none,
+                      {}, ())  # fmt: skip
+    case = Case(Path("prone.mha"), (-100.0, 30.0, 5.0))
+    require_nipple(replace(case, nipple_mm=(-105.0, -3.0, 5.0)), mesh)
+    with pytest.raises(InputError, match=r"on the breast's skin, got \(-105, -40, 5\), 40 mm from"):
+        require_nipple(replace(case, nipple_mm=(-105.0, -40.0, 5.0)), mesh)
+    with pytest.raises(InputError, match="of the breast with the tumour"):
+        require_nipple(replace(case, nipple_mm=(95.0, 0.0, 5.0)), mesh)

@@ -16,6 +16,7 @@ from supple.breast.facets import boundary_facets
 from supple.breast.fidelity import fidelity
 from supple.breast.report import ReportData, write_report
 from supple.breast.result import (
+    NIPPLE_ESTIMATED,
     Check,
     MeshFigures,
     Parameter,
@@ -182,7 +183,7 @@ def _warnings(o: Outcome, nipple_estimated: bool) -> list[str]:
         if o.identified.failed:
             told.append(f"{o.identified.failed} sets of parameters tried had no rest shape.")
     if nipple_estimated:
-        told.append("The nipple was estimated from the shape of the prone breast.")
+        told.append(NIPPLE_ESTIMATED)
     if o.case.tumour_diameter_mm is None:
         told.append(f"No diameter of the tumour was given: {DIAMETER:g} mm was assumed.")
     if o.registered is None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.breast.report_scene import most_movement
+from supple.breast.result import NIPPLE_ESTIMATED
 
 if TYPE_CHECKING:
     from supple.breast.report import ReportData
@@ -27,6 +28,7 @@ def words(data: ReportData) -> dict[str, str]:
         "clock": escape(_clock(tumour.clock)),
         "breast": escape(tumour.breast),
         "nipple_distance": f"{tumour.nipple_distance_mm:.0f}",
+        "nipple_note": _nipple_note(result),
         "shift": f"{np.linalg.norm(shift):.0f}",
         "shift_words": escape(_directions(shift)),
         "prone_mm": _coordinates(tumour.prone_mm),
@@ -43,6 +45,11 @@ def words(data: ReportData) -> dict[str, str]:
         "gland_toggle": "" if data.gland is not None else "hidden",
         "chest_toggle": "" if data.chest is not None else "hidden",
     }
+
+
+def _nipple_note(result: Result) -> str:
+    estimated = NIPPLE_ESTIMATED in result.warnings
+    return "; <b>the nipple is estimated</b>, up to 20 mm off" if estimated else ""
 
 
 def _clock(clock: str) -> str:

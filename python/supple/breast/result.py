@@ -18,6 +18,13 @@ Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 
+#: The estimate was up to 20 mm off on images whose nipples are known.
+NIPPLE_ESTIMATED = (
+    "The nipple was estimated from the breast's shape and may be 20 mm off, and with it clock and "
+    "distance from it: give its place to be sure."
+)
+
+
 @dataclass(frozen=True)
 class SkinPoint:
     """A point that the skin carries along: a triangle and barycentric coordinates in it."""

@@ -273,7 +273,9 @@ def _notes(region: BreastRegion, parts: int, genus: int) -> tuple[str, ...]:
     if parts > 1:
         notes.append(f"The breasts are {parts} separate bodies: no tissue joins them.")
     if genus > 0:
-        notes.append(f"The body's surface has {genus} handles or tunnels.")
+        notes.append(
+            f"Handles or tunnels in the body's surface: {genus}; look at them in prone.vtu."
+        )
     lost = 1.0 - region.volume_mm3 / region.segmented_mm3
     if abs(lost) > 0.03:
         notes.append(

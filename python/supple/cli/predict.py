@@ -77,12 +77,15 @@ def _case(source: Path, tumour: str | None, allow_energy_files: bool) -> Case:
 
 def tell(run: Run, result: Result) -> None:
     """The result as the command's answer; a failed check makes it doubtful."""
+    from ..breast.result import NIPPLE_ESTIMATED
+
     run.result |= result.to_dict()
     t = result.tumour
     x, y, z = t.supine_mm
+    nipple = "the estimated nipple" if NIPPLE_ESTIMATED in result.warnings else "the nipple"
     run.say(
         f"supine tumour: {t.depth_mm:.0f} mm deep, {t.clock} of the {t.breast} breast, "
-        f"{t.nipple_distance_mm:.0f} mm from the nipple; LPS mm ({x:.1f}, {y:.1f}, {z:.1f})"
+        f"{t.nipple_distance_mm:.0f} mm from {nipple}; LPS mm ({x:.1f}, {y:.1f}, {z:.1f})"
     )
     if result.skin_mae_mm is not None:
         run.say(f"skin: {result.skin_mae_mm:.2f} mm from the scan on average")
