@@ -363,13 +363,9 @@ class Body:
         return total
 
     def _normals(self) -> dict[int, Floats]:
-        from .core import core
-
         normals: dict[int, Floats] = {}
         for slide in self._description.slides:
-            surface = slide.surface
-            tree = core().SurfaceTree(surface.points, surface.triangles.astype(np.int32))
-            landed = tree.closest(self.mesh.points[slide.nodes])
+            landed = slide.surface.closest(self.mesh.points[slide.nodes])
             normals |= dict(zip(slide.nodes.tolist(), landed.normal, strict=True))
         return normals
 
