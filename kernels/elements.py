@@ -20,6 +20,8 @@ CELLS = {
 }  # fmt: skip
 #: Degree of the stiffness' quadrature (points: 1, 4, 8, 27 and 1, 3, 4, 9).
 STIFFNESS_DEGREE = {"P1": 1, "P2": 2, "Q1": 2, "Q2": 4, "T1": 1, "T2": 2, "S1": 2, "S2": 4}
+#: Degree of a mixed form's quadrature (points: 14 and 27), by its displacement's element.
+MIXED_DEGREE = {"P2": 4, "Q2L": 4}
 #: Degree of the loads' quadrature: at least twice the element's degree.
 LOAD_DEGREE = {"P1": 2, "P2": 4, "Q1": 2, "Q2": 4, "T1": 2, "T2": 4, "S1": 2, "S2": 4}
 
@@ -42,6 +44,40 @@ class Space:
         return ufl.Coefficient(ufl.FunctionSpace(self.mesh, element))
 
 
+@dataclass(frozen=True)
+class MixedSpace:
+    """Displacement on an isoparametric element with a continuous pressure of one degree less."""
+
+    name: str
+    mesh: Any
+    unknown: Any  # displacement, then the pressures of the corners
+    test_all: Any
+    trial: Any
+    pressures: int  # of a cell
+
+    @property
+    def displacement(self) -> Any:
+        """u of the unknown."""
+        return ufl.split(self.unknown)[0]
+
+    @property
+    def pressure(self) -> Any:
+        """p of the unknown."""
+        return ufl.split(self.unknown)[1]
+
+    @property
+    def test(self) -> Any:
+        """Displacement's part of the test function."""
+        return ufl.split(self.test_all)[0]
+
+    @property
+    def pressure_test(self) -> Any:
+        """Pressure's part of the test function."""
+        return ufl.split(self.test_all)[1]
+
+    field = Space.field
+
+
 @cache
 def scalar_element(name: str) -> Any:
     """The scalar Basix element of a name in CELLS; nodal in every case."""
@@ -57,6 +93,16 @@ def space(name: str) -> Space:
     mesh = ufl.Mesh(element)
     V = ufl.FunctionSpace(mesh, element)
     return Space(name, mesh, ufl.Coefficient(V), ufl.TestFunction(V), ufl.TrialFunction(V))
+
+
+def mixed_space(name: str) -> MixedSpace:
+    """Taylor and Hood's pair on the element ``name``."""
+    element = basix.ufl.blocked_element(scalar_element(name), shape=(3,))
+    mesh = ufl.Mesh(element)
+    pressure = basix.ufl.element("P", CELLS[name][0], 1)
+    V = ufl.FunctionSpace(mesh, basix.ufl.mixed_element([element, pressure]))
+    unknowns = ufl.Coefficient(V), ufl.TestFunction(V), ufl.TrialFunction(V)
+    return MixedSpace(name, mesh, *unknowns, pressure.dim)
 
 
 def quadrature(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:

@@ -97,6 +97,29 @@ class Law:
             return f["psi"](k, **self.arguments("psi", values))
         return f["psi_dev"](k, **self.arguments("psi_dev", values)) + self.psi_vol(k.J, values).U
 
+    def psi_dev(self, k: Any, values: dict[str, Any]) -> Any:
+        """The isochoric part of a law that gives its parts, Pa.
+
+        Raises:
+            EnergyFileError: the law gives its energy as a whole.
+        """
+        if not self.is_split:
+            raise EnergyFileError(
+                f"{self.path}:{self.line}: {self.name} gives psi as a whole; a mixed or "
+                "mean-dilatation formulation needs psi_dev(k, ...) and psi_vol(J, ...)."
+            )
+        return self._functions["psi_dev"](k, **self.arguments("psi_dev", values))
+
+    @property
+    def is_split(self) -> bool:
+        """Whether the law gives psi_dev and psi_vol, as nearly incompressible ones do."""
+        return {"psi_dev", "psi_vol"} <= set(self._functions)
+
+    def psi_mixed(self, k: Any, p: Any, values: dict[str, Any]) -> Any:
+        """psi_dev + p g(J) - U*(p), Pa; Mazier 2022, eqs. 38 and 41."""
+        volumetric = self.psi_vol(k.J, values)
+        return self.psi_dev(k, values) + p * volumetric.g - volumetric.conjugate(p)
+
     def psi_vol(self, J: Any, values: dict[str, Any]) -> energy.Volumetric:
         """The volumetric part of a nearly incompressible law."""
         volumetric = self._functions["psi_vol"](J, **self.arguments("psi_vol", values))

@@ -1,7 +1,8 @@
 """The name of one kernel library: law.element.form[.q<degree>] or load.element.
 
     neo_hookean.P1.direct        mooney_rivlin.Q2.inverse.q6
-    neo_hookean.T1.skin_direct   traction.T1
+    neo_hookean.T1.skin_direct   mooney_rivlin.P2.mixed_direct
+    traction.T1                  neo_hookean.P1.direct_sensitivity
 
 Names only: nothing of UFL is imported here.
 """
@@ -13,7 +14,16 @@ from pathlib import Path
 
 SOLIDS = ("P1", "P2", "Q1", "Q2")
 FACETS = ("T1", "T2", "S1", "S2")
-LAW_FORMS = ("direct", "inverse", "skin_direct", "skin_inverse")
+FORMULATIONS = {"displacement": "", "mixed": "mixed_", "mean-dilatation": "mean_dilatation_"}
+#: Elements on which a formulation is offered.
+OFFERED = {"displacement": SOLIDS, "mixed": ("P2", "Q2L"), "mean-dilatation": ("Q1",)}
+#: Ends the name of the form whose sensitivities a unit holds.
+SENSITIVITY = "_sensitivity"
+LAW_FORMS = tuple(
+    f"{formulation}{way}"
+    for formulation in (*FORMULATIONS.values(), "skin_")
+    for way in ("direct", "inverse")
+)
 VOLUME_LOADS = ("body_force", "body_force_rest")
 FACET_LOADS = ("traction", "traction_moved", "pressure", "pressure_moved")
 
@@ -23,7 +33,7 @@ class Unit:
     """One kernel library.
 
     Attributes:
-        form: one of LAW_FORMS, VOLUME_LOADS or FACET_LOADS.
+        form: one of LAW_FORMS, VOLUME_LOADS or FACET_LOADS, or that with SENSITIVITY behind it.
         element: name of the cell or facet element.
         law: energy file, None for a load.
         degree: quadrature degree, None for the pinned default.
@@ -55,9 +65,10 @@ def parse(name: str, materials: Path) -> Unit:
         ValueError: no such form or element.
     """
     parts = name.split(".")
-    if len(parts) == 2 and parts[0] in VOLUME_LOADS + FACET_LOADS:
+    base = parts[0 if len(parts) == 2 else min(2, len(parts) - 1)].removesuffix(SENSITIVITY)
+    if len(parts) == 2 and base in VOLUME_LOADS + FACET_LOADS:
         return Unit(parts[0], parts[1])
-    if len(parts) not in (3, 4) or parts[2] not in LAW_FORMS or parts[1] not in SOLIDS + FACETS:
+    if len(parts) not in (3, 4) or base not in LAW_FORMS or parts[1] not in SOLIDS + FACETS:
         raise ValueError(f"unit: expected law.element.form or load.element, got {name!r}.")
     degree = int(parts[3].removeprefix("q")) if len(parts) == 4 else None
     return Unit(parts[2], parts[1], materials / f"{parts[0]}.py", degree)
