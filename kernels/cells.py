@@ -70,6 +70,14 @@ class Element:
         """Corner nodes per cell; they come first in both numberings."""
         return len(self.cell.corners)
 
+    def corner_values(self) -> Floats:
+        """Shape functions of the cell's corners alone, degree 1, at all nodes (nodes, corners)."""
+        powers = _span(self.cell, 1)
+        result: Floats = _monomials(self.points, powers) @ np.linalg.inv(
+            _monomials(self.points[: self.corners], powers)
+        )
+        return result
+
     def gradients(self, at: npt.ArrayLike) -> Floats:
         """Shape functions' reference gradients (q, nodes, dim), nodes in VTK order, at (q, dim)."""
         coefficients = np.linalg.inv(_monomials(self.points, self.powers))

@@ -43,6 +43,8 @@ class Equilibrium:
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
+        pressure: (n,) Pa, the multiplier of a mixed formulation, σ_vol = p g'(J), so positive in
+            tension; linear between the corners. None in the others.
     """
 
     u: Floats
@@ -54,6 +56,7 @@ class Equilibrium:
     warnings: tuple[str, ...]
     _solved: terms.Description = field(repr=False)  # as it was, with its mesh
     _form: str = field(repr=False)
+    pressure: Floats | None = None
 
     @property
     def points(self) -> Floats:
@@ -100,7 +103,9 @@ class Equilibrium:
     @cached_property
     def _values(self) -> PointValues:
         mesh = self._solved.mesh
-        system = core().System(np.ascontiguousarray(mesh.points).ravel())
+        system = terms.new_system(self._solved)
+        nodes = terms.pressure_nodes(self._solved)
+        unknowns = self.u.ravel() if self.pressure is None else np.append(self.u, self.pressure[nodes])
         parts, rows = [], []
         for region in self._solved.regions:
             if len(region.ids) == 0:
@@ -108,7 +113,7 @@ class Equilibrium:
             term = terms.region_term(system, self._solved, region, self._form)
             terms.set_values(term, region.values)
             q = len(term.weights)
-            table = term.tabulate("points", self.u.ravel()).reshape(len(region.ids), q, 20)
+            table = term.tabulate("points", unknowns).reshape(len(region.ids), q, 20)
             table[..., 19] *= term.weights
             parts.append(table)
             rows.append(region.ids)
@@ -158,21 +163,34 @@ class Rest(Equilibrium):
         return self._solved.mesh.moved(self.points)
 
 
-def outcome(result: Any, built: terms.Built, fixed: npt.NDArray[np.bool_]) -> dict[str, Any]:
+def outcome(
+    result: Any, built: terms.Built, d: terms.Description, fixed: npt.NDArray[np.bool_]
+) -> dict[str, Any]:
     """The fields of an `Equilibrium` that a converged result gives."""
     from .newton import as_dict
 
     t = built.system.timings
     has_energy = built.system.has_energy()
     return {
-        "u": result.u.reshape(-1, 3),
+        "u": result.u[: fixed.size].reshape(-1, 3),
+        "pressure": _pressure(result.u[fixed.size :] * built.scalar_unit, d),
         "iterations": sum(1 for i in result.history if i.iteration > 0),
         "history": [as_dict(i) for i in result.history],
         "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
-        "reactions": np.where(fixed, result.residual.reshape(-1, 3), 0.0),
+        "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
         "warnings": _warnings(built.system.volume_ratio(result.u)),
     }
+
+
+def _pressure(corners: Floats, d: terms.Description) -> Floats | None:
+    """The pressures of the corners, and of every other node what a linear field has there."""
+    if not len(corners):
+        return None
+    mesh, p = d.mesh, np.zeros(len(d.mesh.points))
+    p[terms.pressure_nodes(d)] = corners
+    p[mesh.cells] = p[mesh.cells[:, : mesh.table.corners]] @ mesh.table.corner_values().T
+    return p
 
 
 def _warnings(smallest: Any) -> tuple[str, ...]:

@@ -63,6 +63,7 @@ class Description:
     gravity: Floats  # (3,) m/s²
     forces: Floats  # (n, 3) N
     quadrature: int | None = None
+    formulation: str = "displacement"
     tractions: list[FacetLoad] = field(default_factory=list)
     pressures: list[FacetLoad] = field(default_factory=list)
     skins: list[Region] = field(default_factory=list)  # ids are facets (f, nodes), VTK order
@@ -80,15 +81,19 @@ class Built:
     pressures: list[Any]
     body_force: Any
     forces: Any
+    scalar_unit: float = 1.0  # Pa/m, see KernelTerm::set_scalar_unit
 
 
 def build(d: Description, inverse: bool = False, density_of: str = "rest") -> Built:
     """Make the system; kernels that are not compiled yet are compiled here."""
-    system = core().System(np.ascontiguousarray(d.mesh.points).ravel())
+    system = new_system(d)
     built = Built(system, [], [], [], [], None, core().NodalForce(np.zeros(d.mesh.points.size)))
+    built.scalar_unit = modulus(d) / d.mesh.size
     form = "inverse" if inverse else "direct"
     for region in d.regions:
         built.regions.append(region_term(system, d, region, form) if len(region.ids) else None)
+        if built.regions[-1] is not None:
+            built.regions[-1].set_scalar_unit(built.scalar_unit)
     per_rest = inverse and density_of == "rest"
     load = "body_force_rest" if per_rest else "body_force"
     built.body_force = _load(system, load, d.mesh.element, _cells(d.mesh))
@@ -120,12 +125,42 @@ def refresh(built: Built, d: Description) -> None:
     built.forces.set_forces(d.forces.ravel())
 
 
+def new_system(d: Description) -> Any:
+    """A runtime system of the mesh's dofs, and of the pressures in a mixed formulation."""
+    return core().System(np.ascontiguousarray(d.mesh.points).ravel(), pressure_nodes(d).tolist())
+
+
+def pressure_nodes(d: Description) -> Ints:
+    """Nodes that carry a pressure: the corners in a mixed formulation, none in the others."""
+    corners = d.mesh.table.corners if d.formulation == "mixed" else 0
+    return np.unique(d.mesh.cells[:, :corners]).astype(np.int64)
+
+
+def modulus(d: Description) -> float:
+    """Largest modulus among the parameters, Pa; where p carries the volume, that of psi_dev."""
+    found = []
+    for region in d.regions:
+        names = {p.name for p in region.law.parameters if p.kind.unit == "Pa"}
+        if d.formulation == "mixed":
+            names &= set(region.law.arguments("psi_dev", region.values))
+        found += [float(region.values[name].max()) for name in names if len(region.ids)]
+    return max(found, default=1.0)
+
+
 def region_term(system: Any, d: Description, region: Region, form: str) -> Any:
     """The term of a law on its cells, added to the system."""
-    from .kernels.unit import Unit
+    from .kernels.cells import ELEMENTS
+    from .kernels.unit import FORMULATIONS, Unit
 
-    unit = Unit(form, d.mesh.element, region.law.path, d.quadrature)
-    return _add(system, compiled(unit), _cells(d.mesh)[region.ids])
+    unit = Unit(
+        FORMULATIONS[d.formulation] + form, d.mesh.element, region.law.path, d.quadrature
+    )
+    cells = _cells(d.mesh)[region.ids]
+    if d.formulation == "mixed":
+        corners = ELEMENTS[d.mesh.element].corners
+        scalars = np.searchsorted(pressure_nodes(d), cells[:, :corners]) + len(d.mesh.points)
+        cells = np.hstack([cells, scalars.astype(np.int32)])
+    return _add(system, compiled(unit), cells)
 
 
 def skin_term(system: Any, d: Description, skin: Region, form: str) -> Any:
