@@ -22,7 +22,7 @@ __all__ = ["EnergyFileError", "Law", "Parameter", "blamed", "nearest", "read"]
 
 #: Names that a parameter may not have: the kernels' own fields and the arguments of `supple.Body`.
 RESERVED = ("u", "thickness", "mesh", "material", "formulation", "density", "quadrature", "where",
-            "cells", "number")  # fmt: skip
+            "cells", "number", "points", "gravity", "traction", "pressure", "skin")  # fmt: skip
 #: Powers and ranges of plain numbers stay small: reading a file cannot take long.
 LARGEST_EXPONENT, LONGEST_RANGE = 64, 1000
 

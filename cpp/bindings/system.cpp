@@ -61,6 +61,11 @@ void bind_terms(py::module_& module) {
                                                         system.points(), connectivity(cells),
                                                         system.scalars());
           }))
+      .def_property_readonly(
+          "cells",
+          [](const supple::KernelTerm& term) { return supple::Connectivity(term.cells()); })
+      .def_property_readonly(
+          "nodes", [](const supple::KernelTerm& term) { return term.library().table().nodes; })
       .def("set_scalar_unit", &supple::KernelTerm::set_scalar_unit)
       .def_property_readonly("fields",
                              [](const supple::KernelTerm& term) {

@@ -38,7 +38,6 @@ KernelTerm::KernelTerm(std::shared_ptr<const KernelLibrary> library,
   colouring_ = colour_cells(cells_, nodes + scalars, group_);
   fields_.resize(static_cast<std::size_t>(table.field_count));
   energy_ = library_->find("energy");
-  residual_ = &library_->require("residual");
   tangent_ = library_->find("tangent");
   volume_ratio_ = library_->find("volume_ratio");
 }
@@ -166,8 +165,9 @@ void KernelTerm::residual(const ConstVector& u, double scale, MutableVector r) c
 }
 
 void KernelTerm::add_residual(const ConstVector& u, double scale, MutableVector r) const {
-  const Index lanes = library_->table().lanes, rows = residual_->rows;
-  each(*residual_, u, [&](Index first, Index count, const double* A, Index) {
+  const supple_kernel& kernel = library_->require("residual");
+  const Index lanes = library_->table().lanes, rows = kernel.rows;
+  each(kernel, u, [&](Index first, Index count, const double* A, Index) {
     for (Index lane = 0; lane < count; ++lane) {
       const Index* node = cells_.data() + static_cast<std::ptrdiff_t>(first + lane) * cells_.cols();
       for (Index i = 0; i < rows; ++i)

@@ -35,6 +35,7 @@ _HOME = {
     "assemble": "body",
     "material": "laws",
     "materials": "laws",
+    "sensitivity": "sensitivity",
 }
 
 __all__ = [

@@ -84,26 +84,32 @@ class Built:
     scalar_unit: float = 1.0  # Pa/m, see KernelTerm::set_scalar_unit
 
 
-def build(d: Description, inverse: bool = False, density_of: str = "rest") -> Built:
-    """Make the system; kernels that are not compiled yet are compiled here."""
+def build(
+    d: Description, inverse: bool = False, density_of: str = "rest", suffix: str = ""
+) -> Built:
+    """Make the system; kernels that are not compiled yet are compiled here.
+
+    Args:
+        suffix: SENSITIVITY for terms that hold the sensitivity kernels instead.
+    """
     system = new_system(d)
     built = Built(system, [], [], [], [], None, core().NodalForce(np.zeros(d.mesh.points.size)))
     built.scalar_unit = modulus(d) / d.mesh.size
-    form = "inverse" if inverse else "direct"
+    form = ("inverse" if inverse else "direct") + suffix
     for region in d.regions:
         built.regions.append(region_term(system, d, region, form) if len(region.ids) else None)
         if built.regions[-1] is not None:
             built.regions[-1].set_scalar_unit(built.scalar_unit)
     per_rest = inverse and density_of == "rest"
     load = "body_force_rest" if per_rest else "body_force"
-    built.body_force = _load(system, load, d.mesh.element, _cells(d.mesh))
+    built.body_force = _load(system, load + suffix, d.mesh.element, _cells(d.mesh))
     for traction in d.tractions:
         moved = (traction.per == "rest") == inverse
         unit = "traction_moved" if moved else "traction"
-        built.tractions.append(_load(system, unit, d.mesh.table.facet, _facets(d, traction.facets)))
+        built.tractions.append(_load(system, unit + suffix, d.mesh.table.facet, _facets(d, traction.facets)))
     for pressure in d.pressures:
         unit = "pressure" if inverse else "pressure_moved"
-        built.pressures.append(_load(system, unit, d.mesh.table.facet, _facets(d, pressure.facets)))
+        built.pressures.append(_load(system, unit + suffix, d.mesh.table.facet, _facets(d, pressure.facets)))
     for skin in d.skins:
         built.skins.append(skin_term(system, d, skin, f"skin_{form}"))
     for slide in d.slides:

@@ -71,7 +71,7 @@ class KernelTerm final : public Term {
   Colouring colouring_;
   std::vector<Vector> fields_; // by field number; "u" stays empty
   mutable Vector constant_;
-  const supple_kernel *energy_, *residual_, *tangent_, *volume_ratio_;
+  const supple_kernel *energy_, *tangent_, *volume_ratio_;
 };
 
 } // namespace supple
