@@ -75,8 +75,11 @@ def case(request, distorted):
 
 
 def assert_derivative(found, change, scale):
-    """change(h) is R at a parameter moved by h of its size ``scale`` along one direction."""
-    expected = richardson(change, 4e-2) / scale
+    """change(h) is R at a parameter moved by h of its size ``scale`` along one direction.
+
+    Steps are small: a skin between taut, wrinkled and slack has a kink, which no step may cross.
+    """
+    expected = richardson(change, 1e-2) / scale
     assert abs(expected).max() > 0
     assert abs(found - expected).max() < MAGNITUDE * abs(expected).max()
 
