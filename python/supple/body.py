@@ -38,7 +38,9 @@ class Body:
         material: name of a shipped energy, or path of an energy file.
         formulation: "displacement".
         density: kg/m³, of the rest state; one number or one a cell.
-        quadrature: degree of the stiffness' rule; None for the element's own (DESIGN §4).
+        quadrature: degree of the stiffness' rule, or (degree, scheme) with a scheme "default",
+            "gauss_jacobi", "gll" (hexahedra) or "xiao_gimbutas" (tetrahedra; prisms, whose rules
+            are a triangle's times Gauss'); None for the element's own (DESIGN §4).
         **values: the law's parameters in SI, each one number or one a cell.
 
     Raises:
@@ -52,13 +54,11 @@ class Body:
         material: str | Path,
         formulation: str = "displacement",
         density: npt.ArrayLike = 0.0,
-        quadrature: int | None = None,
+        quadrature: int | tuple[int, str] | None = None,
         **values: Any,
     ) -> None:
         if formulation not in FORMULATIONS:
             raise InputError(f"formulation must be one of {FORMULATIONS}, got {formulation!r}.")
-        if quadrature is not None and not 1 <= quadrature <= 20:
-            raise InputError(f"quadrature must be a degree from 1 to 20, got {quadrature}.")
         law, count = read_law(material), len(mesh.cells)
         region = terms.Region(law, np.arange(count), parameters.defaults(law, count))
         region.values |= parameters.given(law, values, count)
@@ -67,7 +67,7 @@ class Body:
             raise InputError(f"density must be at least 0 kg/m³, got {rho.min():g}.")
         n = len(mesh.points)
         self._description = terms.Description(
-            mesh, [region], rho, np.zeros(3), np.zeros((n, 3)), quadrature
+            mesh, [region], rho, np.zeros(3), np.zeros((n, 3)), _degree(mesh, quadrature)
         )
         self._fixed = np.zeros((n, 3), dtype=bool)
         self._prescribed = np.zeros((n, 3))
@@ -398,6 +398,18 @@ def assemble(body: Body, u: npt.ArrayLike) -> tuple[float, Floats, csr_array]:
     energy = system.energy(flat, 1.0) if system.has_energy() else float("nan")
     tangent = csr_array(system.tangent(flat), shape=(flat.size, flat.size))
     return energy, system.residual(flat, 1.0).reshape(-1, 3), tangent
+
+
+def _degree(mesh: Mesh, quadrature: int | tuple[int, str] | None) -> int | None:
+    """The rule that was asked for, checked before anything is compiled."""
+    from .kernels.degree import checked
+
+    if quadrature is None:
+        return None
+    try:
+        return checked(quadrature, mesh.table.cell.name)
+    except ValueError as problem:
+        raise InputError(str(problem)) from None
 
 
 def _vector(name: str, value: npt.ArrayLike) -> Floats:
