@@ -22,7 +22,7 @@ from ffcx.options import FFCX_DEFAULT_OPTIONS
 
 from . import checks, elements, reader
 from .forms import loads, mean_dilatation, membrane, mixed, sensitivity, volume
-from .forms.common import Composite, Forms
+from .forms.common import Forms
 from .stretch import FROZEN_IN_C  # registers Frozen: UFL fixes its types when a form is made
 from .unit import SENSITIVITY, Unit
 
@@ -142,7 +142,9 @@ def _size(coefficient: Any) -> int:
 
 def _composites(forms: Forms) -> list[_Kernel]:
     """The kernels that C of the form's own makes of parts; the parts come with the first of them."""
-    parts = "\n".join(_part(_kernel(name, item, forms), forms) for name, item in forms.parts.items())
+    parts = "\n".join(
+        _part(_kernel(name, item, forms), forms) for name, item in forms.parts.items()
+    )
     kernels = []
     for name, c in forms.composites.items():
         code = f"{parts}static void {name}({_ARGUMENTS})\n{{{c.body}}}\n"

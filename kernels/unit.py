@@ -1,8 +1,9 @@
-"""The name of one kernel library: law.element.form[.q<degree>] or load.element.
+"""The name of one kernel library: law.element.form[.q<degree>[-<scheme>]] or load.element.
 
     neo_hookean.P1.direct        mooney_rivlin.Q2.inverse.q6
-    neo_hookean.T1.skin_direct   mooney_rivlin.P2.mixed_direct
-    traction.T1                  neo_hookean.P1.direct_sensitivity
+    neo_hookean.T1.skin_direct   mooney_rivlin.P2.direct.q4-xiao_gimbutas
+    traction.T1                  mooney_rivlin.P2.mixed_direct
+    body_force.P1                neo_hookean.P1.direct_sensitivity
 
 Names only: nothing of UFL is imported here.
 """
@@ -12,8 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-SOLIDS = ("P1", "P2", "Q1", "Q2")
-FACETS = ("T1", "T2", "S1", "S2")
+from . import cells
+from . import degree as degrees
+
+SOLIDS = tuple(cells.ELEMENTS)
+FACETS = tuple(cells.FACETS)
 FORMULATIONS = {"displacement": "", "mixed": "mixed_", "mean-dilatation": "mean_dilatation_"}
 #: Elements on which a formulation is offered.
 OFFERED = {"displacement": SOLIDS, "mixed": ("P2", "Q2L"), "mean-dilatation": ("Q1",)}
@@ -36,7 +40,7 @@ class Unit:
         form: one of LAW_FORMS, VOLUME_LOADS or FACET_LOADS, or that with SENSITIVITY behind it.
         element: name of the cell or facet element.
         law: energy file, None for a load.
-        degree: quadrature degree, None for the pinned default.
+        degree: of the quadrature, maybe with a scheme (`degree.Degree`); None for the pinned rule.
     """
 
     form: str
@@ -48,7 +52,7 @@ class Unit:
     def name(self) -> str:
         if self.law is None:
             return f"{self.form}.{self.element}"
-        suffix = "" if self.degree is None else f".q{self.degree}"
+        suffix = "" if self.degree is None else f".{degrees.named(self.degree)}"
         return f"{self.law.stem}.{self.element}.{self.form}{suffix}"
 
 
@@ -62,7 +66,7 @@ def parse(name: str, materials: Path) -> Unit:
     """The unit of a name; a law is looked up in the folder ``materials``.
 
     Raises:
-        ValueError: no such form or element.
+        ValueError: no such form, element or quadrature.
     """
     parts = name.split(".")
     base = parts[0 if len(parts) == 2 else min(2, len(parts) - 1)].removesuffix(SENSITIVITY)
@@ -70,5 +74,5 @@ def parse(name: str, materials: Path) -> Unit:
         return Unit(parts[0], parts[1])
     if len(parts) not in (3, 4) or base not in LAW_FORMS or parts[1] not in SOLIDS + FACETS:
         raise ValueError(f"unit: expected law.element.form or load.element, got {name!r}.")
-    degree = int(parts[3].removeprefix("q")) if len(parts) == 4 else None
+    degree = degrees.parse(parts[3]) if len(parts) == 4 else None
     return Unit(parts[2], parts[1], materials / f"{parts[0]}.py", degree)

@@ -51,12 +51,11 @@ class Forms:
 
 
 def measure(space: Space, degree: int) -> Any:
-    """dx on the term's own mesh with the pinned rule."""
-    return ufl.Measure(
-        "dx",
-        domain=space.mesh,
-        metadata={"quadrature_degree": degree, "quadrature_rule": "default"},
-    )
+    """dx on the term's own mesh with the very points of `at_points`."""
+    points, weights = quadrature(space.name, degree)
+    rule = {"quadrature_rule": "custom", "quadrature_degree": int(degree),
+            "quadrature_points": points, "quadrature_weights": weights}  # fmt: skip
+    return ufl.Measure("dx", domain=space.mesh, metadata=rule)
 
 
 def volume_scale(space: Space) -> Any:

@@ -23,7 +23,10 @@ from .common import Forms, at_points, measure, volume_scale
 def direct(law: Law, element: str, degree: int) -> Forms:
     """Kernels energy (of the saddle), residual, tangent, volume_ratio and points."""
     space, values = _prepare(law, element)
-    F, p = ufl.variable(ufl.Identity(3) + ufl.grad(space.displacement)), ufl.variable(space.pressure)
+    F, p = (
+        ufl.variable(ufl.Identity(3) + ufl.grad(space.displacement)),
+        ufl.variable(space.pressure),
+    )
     psi = law.psi_mixed(Kinematics(F, ufl.Jacobian(space.mesh)), p, values)
     P, gap = ufl.diff(psi, F), ufl.diff(psi, p)
     dx = measure(space, degree)

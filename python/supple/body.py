@@ -38,7 +38,9 @@ class Body:
         formulation: "displacement"; "mixed" (continuous pressure; P2, Q2L) or "mean-dilatation"
             (one volume ratio a cell; Q1), free of locking, for laws with psi_dev and psi_vol.
         density: kg/m³, of the rest state; one number or one a cell.
-        quadrature: degree of the stiffness' rule; None for the element's own (DESIGN §4).
+        quadrature: degree of the stiffness' rule, or (degree, scheme) with a scheme "default",
+            "gauss_jacobi", "gll" (hexahedra) or "xiao_gimbutas" (tetrahedra; prisms, whose rules
+            are a triangle's times Gauss'); None for the element's own (DESIGN §4).
         **values: the law's parameters in SI, each one number or one a cell.
 
     Raises:
@@ -52,11 +54,9 @@ class Body:
         material: str | Path,
         formulation: str = "displacement",
         density: npt.ArrayLike = 0.0,
-        quadrature: int | None = None,
+        quadrature: int | tuple[int, str] | None = None,
         **values: Any,
     ) -> None:
-        if quadrature is not None and not 1 <= quadrature <= 20:
-            raise InputError(f"quadrature must be a degree from 1 to 20, got {quadrature}.")
         law, count = read_law(material), len(mesh.cells)
         _require_offered(formulation, mesh.element)
         _require_split(law, formulation)
@@ -67,7 +67,13 @@ class Body:
             raise InputError(f"density must be at least 0 kg/m³, got {rho.min():g}.")
         n = len(mesh.points)
         self._description = terms.Description(
-            mesh, [region], rho, np.zeros(3), np.zeros((n, 3)), quadrature, formulation
+            mesh,
+            [region],
+            rho,
+            np.zeros(3),
+            np.zeros((n, 3)),
+            _degree(mesh, quadrature),
+            formulation,
         )
         self._fixed = np.zeros((n, 3), dtype=bool)
         self._prescribed = np.zeros((n, 3))
@@ -247,7 +253,9 @@ class Body:
         result, built = self._run(settings, None if start is None else self._start(start))
         newton.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
-        return State(**outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct")
+        return State(
+            **outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct"
+        )
 
     def rest_shape(
         self,
@@ -444,6 +452,18 @@ def _require_split(law: Law, formulation: str) -> None:
             f"formulation {formulation!r} needs a law with psi_dev and psi_vol, and {law.name} "
             'gives psi as a whole; use formulation "displacement" or another law.'
         )
+
+
+def _degree(mesh: Mesh, quadrature: int | tuple[int, str] | None) -> int | None:
+    """The rule that was asked for, checked before anything is compiled."""
+    from .kernels.degree import checked
+
+    if quadrature is None:
+        return None
+    try:
+        return checked(quadrature, mesh.table.cell.name)
+    except ValueError as problem:
+        raise InputError(str(problem)) from None
 
 
 def _vector(name: str, value: npt.ArrayLike) -> Floats:

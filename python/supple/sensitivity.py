@@ -81,22 +81,22 @@ def _by_parameter(
     built: terms.Built, d: terms.Description, flat: Floats, by: str, skin: int | None
 ) -> tuple[list[Piece], int]:
     if skin is None:
-        owners, made, count = d.regions, built.regions, len(d.mesh.cells)
+        made = [(r, t, r.ids) for r, t in zip(d.regions, built.regions, strict=True) if len(r.ids)]
+        count = len(d.mesh.cells)
     else:
         if not 0 <= skin < len(d.skins):
             raise InputError(f"skin must name one of {len(d.skins)} skins, got {skin}.")
-        owners, made, count = [d.skins[skin]], [built.skins[skin]], len(d.skins[skin].ids)
+        made = [(d.skins[skin], part.term, part.rows) for part in built.skins[skin]]
+        count = len(d.skins[skin].ids)
     pieces, size = [], 1
-    for owner, term in zip(owners, made, strict=True):
-        if term is None or by not in owner.values:
-            continue
-        size = owner.values[by].shape[1]
-        ids = owner.ids if skin is None else np.arange(count)
-        pieces.append((term, _table(term, f"d_{by}", flat, size), _columns(ids, size)))
+    for owner, term, ids in made:
+        if by in owner.values:
+            size = owner.values[by].shape[1]
+            pieces.append((term, _table(term, f"d_{by}", flat, size), _columns(ids, size)))
     if not pieces:
         from .kernels.reader import nearest
 
-        known = {name for owner in owners for name in owner.values} | {"points", *_LOADS}
+        known = {name for owner, _, _ in made for name in owner.values} | {"points", *_LOADS}
         raise MaterialError(f"by: no law here has a parameter {by}; {nearest(by, known)}")
     return pieces, count * size
 
@@ -121,20 +121,22 @@ def _by_load(
         return [(built.body_force, force, np.tile(np.arange(3), (len(force), 1)))], 3
     if by == "density":
         force = _table(built.body_force, "d_value", flat, 3) @ d.gravity
-        return [(built.body_force, force[:, :, None], _columns(np.arange(len(force)), 1))], len(force)
+        return [(built.body_force, force[:, :, None], _columns(np.arange(len(force)), 1))], len(
+            force
+        )
     made, size = (built.tractions, 3) if by == "traction" else (built.pressures, 1)
     pieces = []
-    for number, term in enumerate(made):
-        table = _table(term, "d_value", flat, size)
+    for number, part in ((k, part) for k, parts in enumerate(made) for part in parts):
+        table = _table(part.term, "d_value", flat, size)
         columns = np.tile(number * size + np.arange(size), (len(table), 1))
-        pieces.append((term, table, columns))
+        pieces.append((part.term, table, columns))
     return pieces, len(made) * size
 
 
 def _kernel_terms(built: terms.Built) -> Iterable[Any]:
-    volume = [*built.regions, built.body_force]
-    every = [*volume, *built.tractions, *built.pressures, *built.skins]
-    return (term for term in every if term is not None)
+    facets = (part.term for parts in [*built.tractions, *built.pressures, *built.skins]
+              for part in parts)  # fmt: skip
+    return (term for term in [*built.regions, built.body_force, *facets] if term is not None)
 
 
 def _table(term: Any, kernel: str, flat: Floats, cols: int) -> Floats:
@@ -156,6 +158,8 @@ def _assembled(pieces: list[Piece], d: terms.Description, rows: int, columns: in
         cells, m = term.cells.astype(np.int64), term.nodes
         vector = _columns(cells[:, :m], 3).reshape(len(cells), -1)
         row = np.hstack([vector, cells[:, m:] + 2 * len(d.mesh.points)])[:, : table.shape[1]]
-        where = [np.broadcast_to(i, table.shape).ravel() for i in (row[:, :, None], column[:, None])]
+        where = [
+            np.broadcast_to(i, table.shape).ravel() for i in (row[:, :, None], column[:, None])
+        ]
         total = total + coo_array((table.ravel(), tuple(where)), shape=(rows, columns)).tocsr()
     return csr_array(total)

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from . import terms
-from .core import core
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -105,7 +104,9 @@ class Equilibrium:
         mesh = self._solved.mesh
         system = terms.new_system(self._solved)
         nodes = terms.pressure_nodes(self._solved)
-        unknowns = self.u.ravel() if self.pressure is None else np.append(self.u, self.pressure[nodes])
+        unknowns = (
+            self.u.ravel() if self.pressure is None else np.append(self.u, self.pressure[nodes])
+        )
         parts, rows = [], []
         for region in self._solved.regions:
             if len(region.ids) == 0:

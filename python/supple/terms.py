@@ -8,6 +8,7 @@ the terms that exist, so pattern, reduction and symbolic factor live as long as 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +38,7 @@ class Region:
 
 @dataclass
 class FacetLoad:
-    """A traction (3,) or a pressure (1,), Pa, on boundary facets in VTK order."""
+    """A traction (3,) or a pressure (1,), Pa, on boundary facets as `Mesh.boundary` gives them."""
 
     facets: Ints
     value: Floats
@@ -62,12 +63,20 @@ class Description:
     density: Floats  # (c, 1) kg/m³
     gravity: Floats  # (3,) m/s²
     forces: Floats  # (n, 3) N
-    quadrature: int | None = None
+    quadrature: int | None = None  # may name its scheme (kernels.degree)
     formulation: str = "displacement"
     tractions: list[FacetLoad] = field(default_factory=list)
     pressures: list[FacetLoad] = field(default_factory=list)
-    skins: list[Region] = field(default_factory=list)  # ids are facets (f, nodes), VTK order
+    skins: list[Region] = field(default_factory=list)  # ids are rows of `Mesh.boundary`
     slides: list[Slide] = field(default_factory=list)
+
+
+@dataclass
+class FacetTerm:
+    """The term of one kind of facet, and which rows of the load's or skin's facets it holds."""
+
+    term: Any
+    rows: Ints
 
 
 @dataclass
@@ -76,9 +85,9 @@ class Built:
 
     system: Any
     regions: list[Any]
-    skins: list[Any]
-    tractions: list[Any]
-    pressures: list[Any]
+    skins: list[list[FacetTerm]]
+    tractions: list[list[FacetTerm]]
+    pressures: list[list[FacetTerm]]
     body_force: Any
     forces: Any
     scalar_unit: float = 1.0  # Pa/m, see KernelTerm::set_scalar_unit
@@ -106,12 +115,12 @@ def build(
     for traction in d.tractions:
         moved = (traction.per == "rest") == inverse
         unit = "traction_moved" if moved else "traction"
-        built.tractions.append(_load(system, unit + suffix, d.mesh.table.facet, _facets(d, traction.facets)))
+        built.tractions.append(_facet_load(system, d, unit + suffix, traction))
     for pressure in d.pressures:
         unit = "pressure" if inverse else "pressure_moved"
-        built.pressures.append(_load(system, unit + suffix, d.mesh.table.facet, _facets(d, pressure.facets)))
+        built.pressures.append(_facet_load(system, d, unit + suffix, pressure))
     for skin in d.skins:
-        built.skins.append(skin_term(system, d, skin, f"skin_{form}"))
+        built.skins.append(skin_terms(system, d, skin, f"skin_{form}"))
     for slide in d.slides:
         system.add(_slide(system, slide, inverse))
     system.add(built.forces)
@@ -120,14 +129,17 @@ def build(
 
 def refresh(built: Built, d: Description) -> None:
     """Hand the description's present values to the terms."""
-    for term, region in [*zip(built.regions, d.regions, strict=True),
-                         *zip(built.skins, d.skins, strict=True)]:  # fmt: skip
+    for term, region in zip(built.regions, d.regions, strict=True):
         if term is not None:
             set_values(term, region.values)
+    for parts, skin in zip(built.skins, d.skins, strict=True):
+        for part in parts:
+            set_values(part.term, {n: v[part.rows] for n, v in skin.values.items()})
     built.body_force.set_field("value", (d.density * d.gravity).ravel())
-    for term, load in [*zip(built.tractions, d.tractions, strict=True),
-                       *zip(built.pressures, d.pressures, strict=True)]:  # fmt: skip
-        term.set_field("value", np.tile(load.value, len(load.facets)))
+    for parts, load in [*zip(built.tractions, d.tractions, strict=True),
+                        *zip(built.pressures, d.pressures, strict=True)]:  # fmt: skip
+        for part in parts:
+            part.term.set_field("value", np.tile(load.value, len(part.rows)))
     built.forces.set_forces(d.forces.ravel())
 
 
@@ -155,26 +167,25 @@ def modulus(d: Description) -> float:
 
 def region_term(system: Any, d: Description, region: Region, form: str) -> Any:
     """The term of a law on its cells, added to the system."""
-    from .kernels.cells import ELEMENTS
     from .kernels.unit import FORMULATIONS, Unit
 
-    unit = Unit(
-        FORMULATIONS[d.formulation] + form, d.mesh.element, region.law.path, d.quadrature
-    )
+    unit = Unit(FORMULATIONS[d.formulation] + form, d.mesh.element, region.law.path, d.quadrature)
     cells = _cells(d.mesh)[region.ids]
     if d.formulation == "mixed":
-        corners = ELEMENTS[d.mesh.element].corners
-        scalars = np.searchsorted(pressure_nodes(d), cells[:, :corners]) + len(d.mesh.points)
+        corners = cells[:, : d.mesh.table.corners]
+        scalars = np.searchsorted(pressure_nodes(d), corners) + len(d.mesh.points)
         cells = np.hstack([cells, scalars.astype(np.int32)])
     return _add(system, compiled(unit), cells)
 
 
-def skin_term(system: Any, d: Description, skin: Region, form: str) -> Any:
-    """The term of a skin on its facets, added to the system."""
+def skin_terms(system: Any, d: Description, skin: Region, form: str) -> list[FacetTerm]:
+    """The terms of a skin, one a kind of facet, added to the system."""
     from .kernels.unit import Unit
 
-    unit = Unit(form, d.mesh.table.facet, skin.law.path)
-    return _add(system, compiled(unit), _facets(d, skin.ids))
+    return [
+        FacetTerm(_add(system, compiled(Unit(form, kind, skin.law.path)), facets), rows)
+        for kind, facets, rows in _facets(d.mesh, skin.ids)
+    ]
 
 
 def set_values(term: Any, values: dict[str, Floats]) -> None:
@@ -189,6 +200,13 @@ def _load(system: Any, form: str, element: str, cells: npt.NDArray[np.int32]) ->
     term = _add(system, compiled(Unit(form, element)), cells)
     term.is_load = True
     return term
+
+
+def _facet_load(system: Any, d: Description, form: str, load: FacetLoad) -> list[FacetTerm]:
+    return [
+        FacetTerm(_load(system, form, kind, facets), rows)
+        for kind, facets, rows in _facets(d.mesh, load.facets)
+    ]
 
 
 def _add(system: Any, library: str, cells: npt.NDArray[np.int32]) -> Any:
@@ -210,12 +228,12 @@ def _cells(mesh: Mesh) -> npt.NDArray[np.int32]:
     return np.ascontiguousarray(mesh.cells[:, mesh.table.from_vtk], dtype=np.int32)
 
 
-def _facets(d: Description, facets: Ints) -> npt.NDArray[np.int32]:
-    """Facets in kernel order."""
-    from .kernels.cells import FACETS
+def _facets(mesh: Mesh, facets: Ints) -> Iterator[tuple[str, npt.NDArray[np.int32], Ints]]:
+    """Facets in kernel order and which rows they are, by the name of their element."""
+    from .mesh_topology import by_kind
 
-    order = FACETS[d.mesh.table.facet].from_vtk
-    return np.ascontiguousarray(facets[:, order], dtype=np.int32)
+    for kind, rows in by_kind(facets, mesh.table):
+        yield kind.name, np.ascontiguousarray(facets[np.ix_(rows, kind.from_vtk)], np.int32), rows
 
 
 def snapshot(d: Description) -> Description:

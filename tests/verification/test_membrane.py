@@ -51,7 +51,7 @@ def sheet(mesh):
 
 def skin_force(body, u):
     """Residual (n, 3) of the skin alone, N."""
-    return body._system().skins[0].residual(np.ascontiguousarray(u).ravel()).reshape(-1, 3)
+    return body._system().skins[0][0].term.residual(np.ascontiguousarray(u).ravel()).reshape(-1, 3)
 
 
 @pytest.mark.parametrize("state", STATES)
