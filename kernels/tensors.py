@@ -101,6 +101,42 @@ def positive(x: Any) -> Any:
     return max(float(x), 0.0)
 
 
+def choose(test: Any, a: Any, b: Any) -> Any:
+    """``a`` where ``test`` > 0, otherwise ``b``."""
+    if is_symbolic(test):
+        import ufl
+
+        return ufl.conditional(ufl.gt(test, 0.0), a, b)
+    return a if test > 0 else b
+
+
+def Ei(x: Any) -> Any:
+    """Exponential integral of x > 0."""
+    if is_symbolic(x):
+        from .functions import ExponentialIntegral
+
+        return ExponentialIntegral(x)
+    from scipy.special import expi
+
+    return float(expi(x))
+
+
+def cross(a: Any, b: Any) -> Any:
+    """Vector product."""
+    if is_symbolic(a) or is_symbolic(b):
+        import ufl
+
+        return ufl.cross(a, b)
+    return np.cross(a, b).view(Tensor)
+
+
+def axes(f: Any, s: Any) -> tuple[Any, Any, Any]:
+    """Orthonormal axes (f, s', f × s'): s' is the part of ``s`` across the unit vector ``f``."""
+    across = s - dot(f, s) * f
+    across = across / sqrt(dot(across, across))
+    return f, across, cross(f, across)
+
+
 def identity() -> Any:
     """The unit tensor (3, 3)."""
     return np.eye(3).view(Tensor)
