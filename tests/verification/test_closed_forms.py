@@ -168,7 +168,7 @@ def hooke_orthotropic(F, p):
 
 
 def exponential(slope):
-    """c/2 (e^Q - 1) of the isochoric E; ``slope`` gives ∂Q/∂E (3, 3) along the axes, Q = E:slope/2."""
+    """c/2 (e^Q - 1) of the isochoric E; ``slope`` is ∂Q/∂E (3, 3) along the axes, Q = E:slope/2."""
 
     def stress(F, p):
         J, f, _, _ = isochoric(F)
