@@ -122,14 +122,14 @@ class Kinematics:
     def stretch_sum(self, alpha: Any) -> Any:
         """λ1^α + λ2^α + λ3^α, any real α, with exact derivatives where stretches coincide."""
         if self._spectrum is None:
-            return float((_squared_stretches(self.C) ** (0.5 * alpha)).sum())
+            return (_squared_stretches(self.C) ** (0.5 * alpha)).sum()
         return self._spectrum.powers(alpha)
 
     @cached_property
     def log_stretch_squares(self) -> Any:
         """ln²λ1 + ln²λ2 + ln²λ3, with exact derivatives where stretches coincide."""
         if self._spectrum is None:
-            return float((0.25 * np.log(_squared_stretches(self.C)) ** 2).sum())
+            return (0.25 * np.log(_squared_stretches(self.C)) ** 2).sum()
         return self._spectrum.squared_logarithms()
 
     @cached_property
@@ -200,10 +200,10 @@ def _squared_stretches(C: np.ndarray) -> np.ndarray:
     return np.maximum(np.linalg.eigvalsh(np.asarray(C)), 0.0)
 
 
-def _trace_of_stretch(C: np.ndarray, J: float) -> float:
+def _trace_of_stretch(C: np.ndarray, J: float) -> np.float64:
     stretches = np.sqrt(_squared_stretches(C))
     stretches[0] *= np.sign(J) if J < 0 else 1.0
-    return float(stretches.sum())
+    return np.float64(stretches.sum())
 
 
 def matrix(rows: list[list[Any]], like: Any) -> Any:

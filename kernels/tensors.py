@@ -1,4 +1,7 @@
-"""Operations that an energy may use, on UFL expressions (kernels) and on numbers (checks) alike."""
+"""Operations that an energy may use, on UFL expressions (kernels) and on numbers (checks) alike.
+
+Numbers are NumPy's: past their range they become infinite, where Python's own would raise.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +55,7 @@ def tr(a: Any) -> Any:
         import ufl
 
         return ufl.tr(a)
-    return float(np.trace(a))
+    return np.float64(np.trace(a))
 
 
 def det(a: Any) -> Any:
@@ -61,7 +64,7 @@ def det(a: Any) -> Any:
         import ufl
 
         return ufl.det(a)
-    return float(np.linalg.det(a))
+    return np.float64(np.linalg.det(a))
 
 
 def inner(a: Any, b: Any) -> Any:
@@ -70,7 +73,7 @@ def inner(a: Any, b: Any) -> Any:
         import ufl
 
         return ufl.inner(a, b)
-    return float(np.sum(np.asarray(a) * np.asarray(b)))
+    return np.float64(np.sum(np.asarray(a) * np.asarray(b)))
 
 
 def dot(a: Any, b: Any) -> Any:
