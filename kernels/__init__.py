@@ -2,7 +2,10 @@
 
     tensors     operations on UFL expressions and on numbers alike
     energy      the words that an energy file may use
+    functions   functions that UFL and C lack: a frozen value, the exponential integral
+    spectral    sums over principal stretches, smooth where they coincide
     kinematics  what `k` offers: F, C, invariants, stretch tensor
+    membrane_kinematics  the same of a membrane
     law         a strain energy as read: parameters and functions
     reader      an energy file, read with ast and checked before it runs
     cells       node and facet numbers of every element, in files and in kernels

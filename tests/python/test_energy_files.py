@@ -24,7 +24,7 @@ READING = {
     "unknown import": ("from supple.energy import lam\n" + PSI + GOOD, 1, "did you mean lame"),
     "unknown name": (PSI + "    return youn * k.I1\n", 2, "unknown name youn; did you mean young"),
     "builtin": (PSI + "    return open(young)\n", 2, "unknown name open"),
-    "unknown of k": (PSI + "    return young * k.I5\n", 2, "k has no I5; did you mean I"),
+    "unknown of k": (PSI + "    return young * k.I6\n", 2, "k has no I6; did you mean I"),
     "no default": ("def psi(k: Kinematics, young: Pa):\n" + GOOD, 1, "young needs a type and a"),
     "no type": ("def psi(k: Kinematics, young=3e3):\n" + GOOD, 1, "young: Pa = 1e3"),
     "unknown type": ("def psi(k, young: float = 1.0):\n" + GOOD, 1, "use Pa, Ratio, Number"),
