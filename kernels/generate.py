@@ -61,7 +61,8 @@ static const double places[] = {{{places}}};
 static const supple_kernel kernel_list[] = {{{kernels}}};
 static const supple_library library = {{
     SUPPLE_KERNEL_ABI, "{unit}", "{hash}", "{element}", {nodes}, {scalars}, {lanes},
-    {degree}, {point_count}, {dimension}, places, weights, {field_count}, fields, {kernel_count}, kernel_list}};
+    {degree}, {point_count}, {dimension}, places, weights, {field_count}, fields, {kernel_count},
+    kernel_list}};
 
 __attribute__((visibility("default"))) const supple_library* supple_kernels(void) {{
     return &library;
@@ -111,7 +112,8 @@ def source(unit: Unit, contract: str) -> str:
         ),
         unit=unit.name, hash=law_hash, element=unit.element,
         nodes=elements.scalar_element(unit.element).dim, scalars=forms.scalars, lanes=LANES,
-        degree=forms.degree, point_count=len(weights), dimension=places.shape[1], field_count=len(names), kernel_count=len(kernels),
+        degree=forms.degree, point_count=len(weights), dimension=places.shape[1],
+        field_count=len(names), kernel_count=len(kernels),
     )  # fmt: skip
     return head + "\n".join(k.code for k in kernels) + tail
 

@@ -1,9 +1,9 @@
 """Sensitivities: ∂R/∂(every field) and ∂R/∂X of the residual of any term, at fixed unknowns.
 
     d_<field>  (rows × its entries)  by a parameter, a direction, a load's value, a thickness
-    d_points   (rows × 3m)           by the coordinates of the mesh's nodes (UFL: SpatialCoordinate)
+    d_points   (rows × 3m)           by the coordinates of the mesh's nodes (SpatialCoordinate)
 
-A term under mean dilatation adds what its cell's pressure does: ∂R/∂a at fixed p, plus push ⊗ ∂p/∂a.
+A term under mean dilatation adds what the cell's pressure does: ∂R/∂a at fixed p + push ⊗ ∂p/∂a.
 """
 
 from __future__ import annotations

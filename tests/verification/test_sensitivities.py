@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -25,12 +26,12 @@ def stretched(points):
 def richardson(f, h):
     """f'(0) from central differences at h, h/2 and h/4: the error falls as h⁶."""
     d = [(f(h / k) - f(-h / k)) / (2 * h / k) for k in (1, 2, 4)]
-    once = [(4 * fine - coarse) / 3 for coarse, fine in zip(d, d[1:], strict=False)]
+    once = [(4 * fine - coarse) / 3 for coarse, fine in pairwise(d)]
     return (16 * once[1] - once[0]) / 15
 
 
 class Case:
-    """A loaded body with several regions' worth of parameters, at a state that is no equilibrium."""
+    """A loaded body with other parameters in each cell, at a state that is no equilibrium."""
 
     def __init__(self, distorted, element, formulation, inverse):
         self.mesh = distorted(element, (2, 1, 1))
