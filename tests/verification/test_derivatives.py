@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import supple
+from supple.kernels.cells import ELEMENTS
 
-ELEMENTS = ("P1", "P2", "Q1", "Q2")
 LAWS = [material.name for material in supple.materials()]
 #: Laws whose kernels are compiled with Supple, so that every element × form is quick.
 AHEAD = ("neo_hookean", "corotational_polar")
