@@ -275,7 +275,7 @@ def test_gmsh1_is_read_with_sparse_node_numbers(tmp_path):
 
 
 def test_gmsh1_knows_prisms(tmp_path):
-    """Gmsh's type 6: volume 1/2, the triangle below tagged 5 and a side tagged 6, in one row each."""
+    """Gmsh's type 6: volume 1/2, the triangle below tagged 5 and a side tagged 6, a row each."""
     nodes = "".join(f"{i} {p[0]} {p[1]} {p[2]}\n" for i, p in enumerate(ELEMENTS["Pr1"].points))
     path = tmp_path / "m.msh"
     path.write_text(
