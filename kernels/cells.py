@@ -100,6 +100,18 @@ class Element:
         result: Floats = np.einsum("qmd,mn->qnd", slopes, self._coefficients())
         return result
 
+    def carried(self, places: Floats, at: Floats) -> Floats:
+        """Values at points ``places`` (q, dim) → values at ``at`` (r, dim), a matrix (r, q).
+
+        Least squares by the shape functions' monomials, or by fewer (those of the corners alone, a
+        constant) where the points do not tell them apart.
+        """
+        spans = (self.powers, _span(self.cell, 1, True), np.zeros((1, self.cell.dim), np.intp))
+        told_apart = (s for s in spans if np.linalg.matrix_rank(_monomials(places, s)) == len(s))
+        span = next(told_apart)
+        fit = np.linalg.pinv(_monomials(places, span))
+        return np.asarray(_monomials(at, span) @ fit, dtype=float)
+
     def _coefficients(self) -> Floats:
         """Monomials' coefficients (m, nodes) in each shape function."""
         return np.asarray(np.linalg.inv(_monomials(self.points, self.powers)), dtype=float)

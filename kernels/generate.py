@@ -21,7 +21,7 @@ from ffcx.ir.representation import compute_ir
 from ffcx.options import FFCX_DEFAULT_OPTIONS
 
 from . import checks, elements, functions, reader
-from .forms import loads, mean_dilatation, membrane, mixed, sensitivity, volume
+from .forms import loads, mass, mean_dilatation, membrane, mixed, sensitivity, volume
 from .forms.common import Forms
 from .unit import SENSITIVITY, Unit
 
@@ -126,7 +126,7 @@ def _helpers(code: str) -> str:
 def _forms(unit: Unit) -> tuple[Forms, str]:
     form, wanted = unit.form.removesuffix(SENSITIVITY), unit.form.endswith(SENSITIVITY)
     if unit.law is None:
-        load = loads.LOADS[form](unit.element)
+        load = {**loads.LOADS, "mass": mass.mass}[form](unit.element)
         return (sensitivity.of(load) if wanted else load), ""
     law = reader.read(unit.law)
     checks.require_sound(law)
@@ -147,10 +147,9 @@ def _size(coefficient: Any) -> int:
 
 
 def _composites(forms: Forms) -> list[_Kernel]:
-    """The kernels that C of the form's own makes of parts; the parts come with the first of them."""
-    parts = "\n".join(
-        _part(_kernel(name, item, forms), forms) for name, item in forms.parts.items()
-    )
+    """The kernels that C of the form's own makes of parts, which come with the first of them."""
+    made = (_kernel(name, item, forms) for name, item in forms.parts.items())
+    parts = "\n".join(_part(part, forms) for part in made)
     kernels = []
     for name, c in forms.composites.items():
         code = f"{parts}static void {name}({_ARGUMENTS})\n{{{c.body}}}\n"

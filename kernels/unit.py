@@ -28,7 +28,8 @@ LAW_FORMS = tuple(
     for formulation in (*FORMULATIONS.values(), "skin_")
     for way in ("direct", "inverse")
 )
-VOLUME_LOADS = ("body_force", "body_force_rest")
+#: Forms without a law on cells: loads, and the mass matrix that projections need.
+VOLUME_LOADS = ("body_force", "body_force_rest", "mass")
 FACET_LOADS = ("traction", "traction_moved", "pressure", "pressure_moved")
 
 

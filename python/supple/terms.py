@@ -178,6 +178,13 @@ def region_term(system: Any, d: Description, region: Region, form: str) -> Any:
     return _add(system, compiled(unit), cells)
 
 
+def mass_term(system: Any, mesh: Mesh) -> Any:
+    """The mass matrix of the mesh's shape functions, on the points of the system."""
+    from .kernels.unit import Unit
+
+    return core().KernelTerm(compiled(Unit("mass", mesh.element)), system, _cells(mesh))
+
+
 def skin_terms(system: Any, d: Description, skin: Region, form: str) -> list[FacetTerm]:
     """The terms of a skin, one a kind of facet, added to the system."""
     from .kernels.unit import Unit
