@@ -38,10 +38,22 @@ def material(name_or_path: str | Path) -> Material:
     """The energy of that name, or of that file (anything that ends in .py).
 
     Raises:
-        MaterialError: no such energy (the nearest is named), or a wrong file (line and remedy).
+        MaterialError: no such energy (the nearest is named), or a wrong file (line and remedy): not
+            readable, not scalar, not objective, not free of energy and stress at rest.
     """
     law = read_law(name_or_path)
+    if law.path.parent != folder():  # those that ship are held to it by tests
+        _require_sound(law)
     return Material(law.name, law.parameters, law.reference, law.exceptions, law.path)
+
+
+def _require_sound(law: Law) -> None:
+    from .kernels import checks, reader
+
+    try:
+        checks.require_sound(law)
+    except reader.EnergyFileError as problem:
+        raise MaterialError(str(problem)) from None
 
 
 def materials() -> list[Material]:

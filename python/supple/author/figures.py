@@ -23,7 +23,7 @@ AXIS_OF = {"stretch": "stretch λ (1)", "shear": "amount of shear γ (1)",
            "volume ratio": "volume ratio J (1)"}  # fmt: skip
 #: Colours told apart by the colour-blind; Okabe and Ito (2008).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
-_STEEP = 30.0  # a largest stress over the median one, beyond which the axis is cut
+_STEEP = 10.0  # a largest stress over the median one, beyond which the axis is cut
 
 
 def draw_inspection(found: Inspection, file: Path) -> Path:
@@ -90,7 +90,8 @@ def _draw_mode(axes: Any, mode: Mode, drawn: list[Curve], lost: list[Limit]) -> 
         _shade(axes, drawn[0], lost)
     axes.set_ylim(bottom / size, top / size)
     axes.axhline(0.0, color="0.6", linewidth=0.8, zorder=0)
-    axes.set_title(mode.title, fontsize=11)
+    cut = np.nanmin(stresses) < bottom or np.nanmax(stresses) > top
+    axes.set_title(f"{mode.title}, axis cut" if cut else mode.title, fontsize=11)
     axes.set_xlabel(AXIS_OF[mode.control])
     quantity = "shear stress" if mode.control == "shear" else "stress"
     axes.set_ylabel(f"{quantity if mode.measured else 'pressure'} ({unit})")

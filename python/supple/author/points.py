@@ -83,7 +83,7 @@ class PointLaw:
             points = np.tile(_CELL, (count, 1)).ravel()
             cells = np.arange(4 * count, dtype=np.int32).reshape(count, 4)
             system = core().System(points)
-            self._terms = {count: core().KernelTerm(self._library, system, cells)}
+            self._terms[count] = core().KernelTerm(self._library, system, cells)
         term = self._terms[count]
         for p in self.law.parameters:
             rows = parameters.per_cell(p.name, self.values[p.name], count, p.kind.size)

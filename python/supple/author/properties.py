@@ -56,7 +56,7 @@ def excused(law: Law, exception: str, tried: list[Property]) -> list[Property]:
     if exception not in law.exceptions:
         return tried
     broken = any(not p.passed for p in tried)
-    note = "declared exception" if broken else f"holds: take {exception} from the exceptions"
+    note = "" if broken else f"it holds: take {exception} from the file's exceptions"
     return [Property(p.name, broken, p.figure, p.limit, note, exception) for p in tried]
 
 
