@@ -129,7 +129,8 @@ def _write_words(axes: Any, found: Inspection) -> None:
     if "isotropic" in found.law.exceptions:
         lines += ["", "Pxx: pulled along x;", "equibiaxial in xy, yz, zx;", "planar: next axis held"]
     text = "\n".join(["Parameters", "", *lines])
-    axes.text(0.02, 0.98, text, transform=axes.transAxes, va="top", fontsize=10, wrap=True)
+    axes.text(0.02, 0.98, text, transform=axes.transAxes, va="top",
+              fontsize=10 if len(lines) < 16 else 8)  # fmt: skip
 
 
 def _value(value: Any) -> str:

@@ -108,8 +108,9 @@ class _Optimum:
     residual: Floats
     jacobian: Floats
     at_bound: npt.NDArray[np.bool_]
-    cost: float
     agreeing: tuple[int, int]
+    predicted: Floats
+    states: list[Floats]  # F of each series
 
 
 def _problem(
@@ -190,13 +191,16 @@ def _search(problem: _Problem, starts: int, rng: np.random.Generator) -> _Optimu
     same = sum(r.cost <= best.cost * (1 + _SAME) + 1e-30 for r in tried)
     theta = best.x * problem.size
     model = problem.model()
-    residual = problem.weight * (model.predict(theta) - problem.stress)
     jacobian = problem.weight[:, None] * model.jacobian(theta, problem.room(theta))
+    predicted = model.predict(theta)
+    residual = problem.weight * (predicted - problem.stress)
+    states = [F for F in model.states if F is not None]
     bound = np.array(best.active_mask) != 0
     bound |= (theta - problem.low < 1e-6 * problem.size) | (
         problem.high - theta < 1e-6 * problem.size
     )
-    return _Optimum(theta, residual, jacobian, bound, float(best.cost), (len(places), same))
+    agreeing = (len(places), int(same))
+    return _Optimum(theta, residual, jacobian, bound, agreeing, predicted, states)
 
 
 def _descend(problem: _Problem, place: Floats) -> Any:
@@ -246,13 +250,12 @@ def _described(problem: _Problem, found: _Optimum, material: str, weights: str) 
     fitted = _fitted(problem, found, np.sqrt(np.diag(cov)), len(residual) - len(names))
     free = [p for p in fitted if p.state == "free"]
     matrix = fit_result.correlation(cov)
-    predicted = np.split(
-        problem.model().predict(found.theta), np.cumsum([len(s.values) for s in problem.series])[:-1]
-    )
+    ends = np.cumsum([len(s.values) for s in problem.series])[:-1]
+    predicted = np.split(found.predicted, ends)
     overall, each = fit_result.r_squared(problem.series, predicted)
     said = [f"{p.name} ended at its bound, {p.value:.6g}{_unit(p)}." for p in fitted
             if p.state == "at bound"]  # fmt: skip
-    said += fit_result.doubts(free, matrix) + _unstable(problem, found.theta)
+    said += fit_result.doubts(free, matrix) + _unstable(problem, found)
     error = float(np.sqrt(residual @ residual / (len(residual) - len(names))))
     return Fit(material, fitted, problem.series, predicted, overall, each, error, matrix, names,
                weights, found.agreeing, said)  # fmt: skip
@@ -278,14 +281,10 @@ def _fitted(problem: _Problem, found: _Optimum, sd: Floats, freedom: int) -> lis
     return fitted
 
 
-def _unstable(problem: _Problem, theta: Floats) -> list[str]:
+def _unstable(problem: _Problem, found: _Optimum) -> list[str]:
     """A warning for each test whose deformations the fitted law is not elliptic at, or rest."""
-    model = problem.model()
-    model.predict(theta)
     said = []
-    for series, F in zip(model.series, model.states, strict=True):
-        if F is None:
-            continue
+    for series, F in zip(problem.series, found.states, strict=True):
         A = problem.law.tangent(np.concatenate([np.eye(3)[None], F]))
         least = least_wave_stiffness(A)
         if (least <= 1e-9 * np.abs(A[0]).max()).any():

@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 _AXES = (0, 1, 2)
-_LONGEST_STEP = 0.1  # of the driven stretch, from one equilibrium to the next
+_LONGEST_STEP = 0.2  # of the driven stretch, from one equilibrium to the next
 _MOST_ITERATIONS, _MOST_HALVINGS = 40, 30
 _SMALL = 1e-9  # a Newton step of F below which the next one would be rounding
 _FLAT = 1e-4  # a lateral stretch below which the cube has collapsed

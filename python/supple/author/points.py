@@ -28,7 +28,8 @@ _VOLUME = 1.0 / 6.0
 class PointLaw:
     """ψ, P and ∂P/∂F of a law for many deformation gradients at once.
 
-    Where the law does not exist (a logarithm of a negative number) the entries are NaN.
+    Where ψ does not exist (a logarithm of a negative number) all three are NaN: the derivatives'
+    own formulas may go on beyond, as Gent's do.
 
     Args:
         law: the energy as read from its file; compiled here at first use.
@@ -59,13 +60,17 @@ class PointLaw:
 
     def stress(self, F: Floats) -> Floats:
         """P (n, 3, 3) Pa, first Piola–Kirchhoff; P[:, i, j] = ∂ψ/∂F_ij."""
-        nodal = self._tabulate("residual", F).reshape(-1, 4, 3)
+        nodal = self._where_energy("residual", F).reshape(-1, 4, 3)
         return np.swapaxes(nodal[:, 1:], 1, 2) / _VOLUME
 
     def tangent(self, F: Floats) -> Floats:
         """A (n, 3, 3, 3, 3) Pa; A[:, i, j, k, l] = ∂P_ij/∂F_kl."""
-        nodal = self._tabulate("tangent", F).reshape(-1, 4, 3, 4, 3)
+        nodal = self._where_energy("tangent", F).reshape(-1, 4, 3, 4, 3)
         return nodal[:, 1:, :, 1:, :].transpose(0, 2, 1, 4, 3) / _VOLUME
+
+    def _where_energy(self, kernel: str, F: Floats) -> Floats:
+        exists = np.isfinite(self.energy(F))[:, None]
+        return np.where(exists, self._tabulate(kernel, F), np.nan)
 
     def _tabulate(self, kernel: str, F: Floats) -> Floats:
         F = np.asarray(F, dtype=float)
