@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from .errors import ConvergenceError, InputError, MaterialError, MeshError, SuppleError
 
 if TYPE_CHECKING:
+    from .author.curves import curves as curves
+    from .author.fit import fit as fit
     from .body import Body as Body
     from .body import assemble as assemble
     from .laws import Material as Material
@@ -33,6 +35,8 @@ _HOME = {
     "Surface": "surface",
     "Tag": "mesh",
     "assemble": "body",
+    "curves": "author.curves",
+    "fit": "author.fit",
     "material": "laws",
     "materials": "laws",
     "sensitivity": "sensitivity",
