@@ -16,6 +16,8 @@ FACETS = ("T1", "T2", "S1", "S2")
 LAW_FORMS = ("direct", "inverse", "skin_direct", "skin_inverse")
 VOLUME_LOADS = ("body_force", "body_force_rest")
 FACET_LOADS = ("traction", "traction_moved", "pressure", "pressure_moved")
+#: Exact loads of a chosen field, from a law; for studies, so never compiled ahead.
+MANUFACTURED = ("manufactured_force", "manufactured_traction")
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Unit:
     """One kernel library.
 
     Attributes:
-        form: one of LAW_FORMS, VOLUME_LOADS or FACET_LOADS.
+        form: one of LAW_FORMS, VOLUME_LOADS, FACET_LOADS or MANUFACTURED.
         element: name of the cell or facet element.
         law: energy file, None for a load.
         degree: quadrature degree, None for the pinned default.
