@@ -31,6 +31,8 @@ LAW_FORMS = tuple(
 #: Forms without a law on cells: loads, and the mass matrix that projections need.
 VOLUME_LOADS = ("body_force", "body_force_rest", "mass")
 FACET_LOADS = ("traction", "traction_moved", "pressure", "pressure_moved")
+#: Exact loads of a chosen field, from a law; for studies, so never compiled ahead.
+MANUFACTURED = ("manufactured_force", "manufactured_traction")
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Unit:
     """One kernel library.
 
     Attributes:
-        form: one of LAW_FORMS, VOLUME_LOADS or FACET_LOADS, or that with SENSITIVITY behind it.
+        form: one of LAW_FORMS, VOLUME_LOADS, FACET_LOADS or MANUFACTURED; of the first three also
+            with SENSITIVITY behind it.
         element: name of the cell or facet element.
         law: energy file, None for a load.
         degree: of the quadrature, maybe with a scheme (`degree.Degree`); None for the pinned rule.

@@ -185,9 +185,10 @@ class Body:
     # Loads
 
     def force(self, where: Where, force: npt.ArrayLike) -> Body:
-        """Add ``force`` (3,) N on each node of ``where``."""
-        forces = self._description.forces.copy()
-        forces[self.mesh.nodes(where)] += _vector("force", force)
+        """Add ``force``, N, on the nodes of ``where``: (3,) on each, or one row a node."""
+        forces, nodes = self._description.forces.copy(), self.mesh.nodes(where)
+        rows = np.ndim(force) == 2
+        forces[nodes] += _rows("force", force, len(nodes)) if rows else _vector("force", force)
         self._description.forces = forces
         return self
 
@@ -471,3 +472,10 @@ def _vector(name: str, value: npt.ArrayLike) -> Floats:
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InputError(f"{name} must be three numbers, got {value!r}.")
     return vector
+
+
+def _rows(name: str, value: npt.ArrayLike, count: int) -> Floats:
+    rows = np.asarray(value, dtype=float)
+    if rows.shape != (count, 3) or not np.isfinite(rows).all():
+        raise InputError(f"{name} must be finite with shape ({count}, 3), got {rows.shape}.")
+    return rows
