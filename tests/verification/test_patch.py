@@ -70,3 +70,30 @@ def test_quadratic_field_is_exact_on_affine_cells(element):
     at = corners[:, [first]] + np.einsum("qd,cdi->cqi", places, edges)
     expected = np.eye(3) + 2 * np.einsum("ijk,cqk->cqij", B, at)
     np.testing.assert_allclose(found, expected, atol=1e-13)
+
+
+#: Rules asked for, and how many points they have in a cell.
+RULES = [
+    ("P2", (4, "xiao_gimbutas"), 11),
+    ("Q1", (2, "gll"), 27),
+    ("Q2L", None, 27),
+    ("Pr1", (3, "gauss_jacobi"), 4 * 2),
+    ("Pr2", None, 18),
+    ("Pr2", 6, 12 * 4),
+]
+
+
+@pytest.mark.parametrize(("element", "rule", "points"), RULES)
+def test_energy_is_the_sum_over_the_points_that_the_fields_are_given_at(
+    element, rule, points, distorted
+):
+    """∫ψ of the weak form = Σ ψ × volume of the point values: one rule for both."""
+    mesh = distorted(element, (2, 1, 1))
+    rng = np.random.default_rng(1)
+    u = mesh.points @ A.T + 0.02 * rng.uniform(-1, 1, mesh.points.shape)
+    body = supple.Body(mesh, "neo_hookean", quadrature=rule)
+    state = body.prescribe(lambda p: p[:, 0] > -9, u).solve()
+    psi, volume = state._values.psi, state._values.volume
+    assert psi.shape == (len(mesh.cells), points)
+    assert volume.sum() == pytest.approx(mesh.volume, rel=1e-12)
+    assert (psi * volume).sum() == pytest.approx(supple.assemble(body, u)[0], rel=1e-13)
