@@ -14,11 +14,14 @@ MU = YOUNG / 3  # incompressible
 STATES = {"taut": (1.25, 1.15), "wrinkled": (1.3, 0.7), "slack": (0.8, 0.75)}
 #: Share of the unrelaxed energy that a slack skin keeps (DESIGN §4).
 RESIDUAL = 1e-3
+#: Laws whose skins every test run compiles.
+QUICK = ("neo_hookean", "saint_venant_kirchhoff", "mooney_rivlin", "corotational_polar",
+         "corotational_qr", "fung_skin", "hencky")  # fmt: skip
 
 
 def units(*forms):
     chosen = []
-    for law in ("neo_hookean", "mooney_rivlin"):
+    for law in ("neo_hookean", "mooney_rivlin", "fung_skin", "ogden"):
         marks = () if law == "neo_hookean" else (pytest.mark.slow,)
         chosen += [pytest.param(f"{law}.{f}.{g}", marks=marks) for f in FACETS for g in forms]
     return chosen
@@ -139,7 +142,13 @@ def test_slack_sheet_carries_a_thousandth(element):
     assert edge == pytest.approx(RESIDUAL * plain, rel=1e-12)
 
 
-@pytest.mark.parametrize("law", [m.name for m in supple.materials()])
+@pytest.mark.parametrize(
+    "law",
+    [
+        pytest.param(m.name, marks=() if m.name in QUICK else (pytest.mark.slow,))
+        for m in supple.materials()
+    ],
+)
 def test_every_isotropic_law_can_make_a_skin(law):
     """Just below incompressible, where Hooke's terms are finite, the force is too, and it pulls."""
     material = supple.material(law)
