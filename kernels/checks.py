@@ -64,7 +64,7 @@ def rest_stress(law: Law, values: dict[str, Any]) -> np.ndarray:
     and central differences then err at first order.
     """
     wide, narrow = (stress_at(law, np.eye(3), values, step) for step in (1e-5, 5e-6))
-    return 2 * narrow - wide
+    return np.asarray(2 * narrow - wide)
 
 
 def stiffness_scale(law: Law, values: dict[str, Any]) -> float:

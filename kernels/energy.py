@@ -90,6 +90,8 @@ class Kind:
         signed: bool = False,
     ) -> Kind:
         if above is not None:
+            if minimum is not None or maximum is not None:
+                raise ValueError("above stands alone")
             return replace(self, minimum=float(above), maximum=math.inf, open=True)
         low = -math.inf if signed else self.minimum if minimum is None else float(minimum)
         high = self.maximum if maximum is None else float(maximum)
@@ -116,6 +118,8 @@ class Kind:
 
     def range(self) -> str:
         """The bounds in words, for messages."""
+        if self.size > 1:
+            return "three numbers, not all 0"
         left, right = ("(", ")") if self.open else ("[", "]")
         return f"{left}{self.minimum:g}, {self.maximum:g}{right}"
 
