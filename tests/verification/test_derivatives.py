@@ -121,9 +121,14 @@ def test_a_rigid_motion_gives_no_force_unless_declared(unit, case, rotation):
     """u = (Q - I) x + c, p = 0: R below 1e-12 of the stiffness times the body's size."""
     points, exceptions = case.mesh.points, LAWS[unit.split(".")[0]].exceptions
     turned = points @ rotation.T - points
-    for u, broken in ((np.zeros_like(points), "stress_free"), (turned + [0.3, -0.2, 0.1], "objective")):
+    for u, broken in (
+        (np.zeros_like(points), "stress_free"),
+        (turned + [0.3, -0.2, 0.1], "objective"),
+    ):
         x = np.append(u, np.zeros(case.system.scalars))
-        free = "stress_free" not in exceptions and (broken == "stress_free" or broken not in exceptions)
+        free = "stress_free" not in exceptions and (
+            broken == "stress_free" or broken not in exceptions
+        )
         stiffness = abs(dense(case.system, x)).max()
         assert (abs(case.system.residual(x, 1.0)).max() < 1e-12 * stiffness) == free
 
@@ -171,7 +176,9 @@ def _softness(law):
     return second[0] / second[-1]
 
 
-_PAIRS = [(np.eye(3)[i] / (2 if i == j else 2**0.5), np.eye(3)[j]) for i in range(3) for j in range(i, 3)]
+_PAIRS = [
+    (np.eye(3)[i] / (2 if i == j else 2**0.5), np.eye(3)[j]) for i in range(3) for j in range(i, 3)
+]
 
 
 @pytest.mark.parametrize("unit", units("inverse"))
