@@ -49,13 +49,21 @@ def test_the_table_names_unit_law_and_fields(contract):
 
 
 @pytest.mark.parametrize("name", ["neo_hookean.P1.direct", "neo_hookean.T1.skin_inverse",
-                                  "pressure_moved.S1", "corotational_polar.P1.direct"])  # fmt: skip
+                                  "pressure_moved.S1", "corotational_polar.P1.direct",
+                                  "transversely_isotropic_mooney_rivlin.P1.direct"])  # fmt: skip
 def test_generated_c_compiles_without_a_warning(name, contract, tmp_path):
     """-Wall -Werror."""
     (tmp_path / "k.c").write_text(source(name, contract), encoding="utf-8")
     command = [build._compiler(), "-std=c17", "-O0", "-Wall", "-Werror", "-fPIC", "-c", "k.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_helpers_stand_where_they_are_used(contract):
+    """The exponential integral in a law that calls it, and in no other."""
+    assert "exponential_integral" not in source("neo_hookean.P1.direct", contract)
+    text = source("transversely_isotropic_mooney_rivlin.P1.direct", contract)
+    assert text.count("static inline double exponential_integral(double x)") == 1
 
 
 @pytest.mark.parametrize("wrong", ["neo_hookean", "neo_hookean.P9.direct", "neo_hookean.P1.up",
