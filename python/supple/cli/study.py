@@ -52,8 +52,6 @@ def study(run: Run, name: str) -> None:
     manufactured  a chosen field given back under its exact loads: rates of convergence of
                   displacement and strain for three laws and four elements; exits with 3 if
                   one is more than 0.1 off its theory
-
-    Figures need matplotlib: pip install supple[figures].
     """
     run.out_or(Path("out") / name)
     _STUDIES[name](run)
