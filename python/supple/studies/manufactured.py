@@ -20,10 +20,10 @@ import numpy.typing as npt
 from .. import parameters
 from ..body import Body
 from ..core import core
-from ..kernels.cells import FACETS
 from ..kernels.unit import Unit
 from ..laws import compiled, read_law
 from ..mesh import Mesh
+from ..mesh_topology import by_kind
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -125,12 +125,15 @@ def _nodal(mesh: Mesh, terms: list[Any]) -> Floats:
 
 def _terms(case: Case, mesh: Mesh, degree: int) -> tuple[Any, list[Any]]:
     """The exact body force on the cells and the exact tractions on the whole boundary."""
-    system = core().System(np.ascontiguousarray(mesh.points).ravel())
-    facet = FACETS[mesh.table.facet]
-    cells, outside = mesh.cells[:, mesh.table.from_vtk], mesh.boundary()[:, facet.from_vtk]
-    parts = (("force", mesh.element, cells), ("traction", facet.name, outside))
-    terms = [_term(system, case, f"manufactured_{n}", e, c, degree) for n, e, c in parts]
-    return terms[0], terms[1:]
+    system = core().System(np.ascontiguousarray(mesh.points).ravel(), [])
+    outside, cells = mesh.boundary(), mesh.cells[:, mesh.table.from_vtk]
+    solid = _term(system, case, "manufactured_force", mesh.element, cells, degree)
+    facets = [
+        _term(system, case, "manufactured_traction", kind.name,
+              outside[np.ix_(rows, kind.from_vtk)], degree)
+        for kind, rows in by_kind(outside, mesh.table)
+    ]  # fmt: skip
+    return solid, facets
 
 
 def _term(system: Any, case: Case, form: str, element: str, cells: Ints, degree: int) -> Any:
