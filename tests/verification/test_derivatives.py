@@ -67,6 +67,11 @@ def points_of(unit, distorted):
     return distorted(unit.split(".")[1], (2, 1, 1)).points
 
 
+def step(unit):
+    """Of the differences: shorter where exponentials and fibres' limits leave it less room."""
+    return 2e-3 if unit.split(".")[0] in QUICK else 2e-4
+
+
 def direction(size):
     return np.random.default_rng(2).uniform(-1, 1, size)
 
@@ -77,7 +82,7 @@ def test_residual_is_the_derivative_of_the_energy(unit, system, distorted, asser
     u = stretched(points_of(unit, distorted))
     d = direction(u.size)
     slope = system.residual(u, 1.0) @ d
-    assert_slope(lambda x: system.energy(x, 1.0), slope, u, d, 2e-3)
+    assert_slope(lambda x: system.energy(x, 1.0), slope, u, d, step(unit))
 
 
 @pytest.mark.parametrize("unit", units("direct", "inverse"))
@@ -86,7 +91,7 @@ def test_tangent_is_the_derivative_of_the_residual(unit, system, distorted, asse
     u = stretched(points_of(unit, distorted))
     d = direction(u.size)
     slope = dense(system, u) @ d
-    assert_slope(lambda x: system.residual(x, 1.0), slope, u, d, 2e-3)
+    assert_slope(lambda x: system.residual(x, 1.0), slope, u, d, step(unit))
 
 
 @pytest.mark.parametrize("unit", units("direct"))
