@@ -24,8 +24,7 @@ def _hanging_dome(run: Run) -> None:
 def _manufactured(run: Run) -> None:
     from ..studies import manufactured, manufactured_figure
 
-    todo = [(c, e) for c in manufactured.CASES for e in manufactured.ELEMENTS]
-    found = []
+    todo, found = manufactured.plan(), []
     for number, (case, element) in enumerate(todo):
         run.progress(f"{case.name} {element}", number / len(todo))
         found.append(manufactured.run(case, element))
