@@ -88,12 +88,16 @@ def test_rates_are_those_of_theory(case, element):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("formulation", "element"), [("mixed", "P2"), ("mixed", "Q2L"), ("mean-dilatation", "Q1")]
+    ("formulation", "element", "cells"),
+    [("mixed", "P2", (4, 6)), ("mixed", "Q2L", (2, 4, 6)), ("mean-dilatation", "Q1", (8, 12))],
 )
-def test_rates_hold_in_the_other_formulations(formulation, element):
-    """The same loads, the same field; the artery's law."""
-    series = manufactured.run(manufactured.CASES[1], element, formulation=formulation)
-    assert series.miss <= manufactured.BAR, manufactured.line(series)
+def test_other_formulations_are_no_slower_than_theory(formulation, element, cells):
+    """The same loads and field; on these meshes faster, while the pressure's own error fades."""
+    case = Case("mooney_rivlin", {"bulk": 5e3})
+    series = manufactured.run(case, element, cells, formulation)
+    u, strain = series.rates
+    assert min(u) > series.degree + 1 - manufactured.BAR, manufactured.line(series)
+    assert min(strain) > series.degree - manufactured.BAR, manufactured.line(series)
 
 
 @pytest.mark.slow
