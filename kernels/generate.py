@@ -21,6 +21,7 @@ from ffcx.options import FFCX_DEFAULT_OPTIONS
 from . import checks, elements, reader
 from .forms import loads, membrane, volume
 from .forms.common import Forms
+from .parts import in_parts
 from .stretch import FROZEN_IN_C  # registers Frozen: UFL fixes its types when a form is made
 from .unit import Unit
 
@@ -147,5 +148,6 @@ def _function(name: str, text: str) -> str:
     for line, word in re.findall(r"^(static const double (\w+)\[.*;\n)", body, re.MULTILINE):
         if len(re.findall(rf"\b{word}\b", body)) == 1:
             body = body.replace(line, "")
+    parts, body = in_parts(name, body)
     arguments = "double* restrict A, const double* restrict w, const double* restrict x"
-    return f"static void {name}({arguments})\n{body}\n}}\n"
+    return f"{parts}static void {name}({arguments})\n{body}\n}}\n"
