@@ -1,9 +1,14 @@
 """The one table per cell: how files (VTK, meshio) and kernels (Basix) number nodes and facets.
 
-A cell is stated once, by its corners and edges in both numberings; everything else (midside nodes,
-permutations, facets of either order) is derived from that. Reference cells are Basix': the unit
-simplex and the unit cube. Inside Supple arrays are in VTK order; only the door to the kernels
-permutes: ``kernel_cells = vtk_cells[:, element.from_vtk]``.
+A cell is stated once, by its corners, edges and facets as VTK numbers them; everything else is
+derived: a node is the barycentre of the corners of a sub-entity (the corner itself, an edge, a
+quadrilateral, the cell), and the kernels' order is that of Basix, by dimension and then by the
+sub-entity's sorted vertices. Reference cells are Basix': the unit simplex, cube and prism. Inside
+Supple arrays are in VTK order; only the door to the kernels permutes:
+``kernel_cells = vtk_cells[:, element.from_vtk]``.
+
+Where VTK contradicts itself meshio and Gmsh are followed: the first triangle of a wedge of 6 nodes
+turns as that of one of 18, its normal into the cell (meshio swaps two pairs of nodes in VTK files).
 
 Sources: VTK's vtkCellType.h and its cells' edge and face arrays; Basix' ``topology(cell)``;
 serendipity span: Arnold and Awanou (2011), superlinear degree.
@@ -11,7 +16,7 @@ serendipity span: Arnold and Awanou (2011), superlinear degree.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -20,19 +25,20 @@ import numpy.typing as npt
 
 Ints = npt.NDArray[np.intp]
 Floats = npt.NDArray[np.float64]
-Pairs = tuple[tuple[int, int], ...]
+Corners = tuple[int, ...]
+
+#: Fills the rows of facets with fewer nodes than the widest of their element (triangles of prisms).
+NO_NODE = -1
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Corners, edges and facets of one reference cell."""
+    """Corners, edges and facets of one reference cell, numbered as in VTK."""
 
     name: str  # Basix' name
-    corners: tuple[tuple[int, ...], ...]  # (c, dim) reference coordinates in VTK order
-    from_vtk: tuple[int, ...]  # VTK number of each Basix vertex
-    edges: Pairs  # VTK edges by VTK corners
-    kernel_edges: Pairs  # Basix edges by Basix vertices
-    facets: tuple[tuple[int, ...], ...]  # corner loops, VTK order and numbers, outward
+    corners: tuple[tuple[int, ...], ...]  # (c, dim) reference coordinates
+    edges: tuple[Corners, ...]
+    facets: tuple[Corners, ...]  # corner loops, outward; the order of VTK's face nodes
 
     @property
     def dim(self) -> int:
@@ -44,20 +50,26 @@ class Cell:
         """Whether this is a triangle or a tetrahedron."""
         return len(self.corners) == self.dim + 1
 
+    @property
+    def is_cube(self) -> bool:
+        """Whether this is a quadrilateral or a hexahedron."""
+        return self.dim > 1 and len(self.corners) == 2**self.dim
+
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """One element: a cell with nodes at its corners and, at degree 2, at its edges' midpoints."""
+    """One element: a cell with nodes at its corners and, at degree 2, on its edges and beyond."""
 
-    name: str  # P1, P2, Q1, Q2; facets T1, T2, S1, S2
+    name: str  # P1, P2, Q1, Q2, Q2L, Pr1, Pr2; facets T1, T2, S1, S2, S2L
     meshio: str  # meshio's cell type
     cell: Cell
     degree: int
-    facet: str  # name of the facets' element; "" for a facet element
+    entities: tuple[Corners, ...]  # (nodes) corners that each node is the barycentre of
     points: Floats  # (nodes, dim) reference coordinates in VTK order
     from_vtk: Ints  # (nodes,) VTK number of each kernel node
     to_vtk: Ints  # (nodes,) kernel number of each VTK node
-    facets: Ints  # (facets, nodes per facet) VTK numbers, each row in VTK order, outward
+    facet_elements: tuple[str, ...]  # names of its kinds of facet; () for a facet element
+    facets: Ints  # (facets, most nodes) VTK numbers, each row in VTK order, outward, then NO_NODE
     powers: Ints  # (nodes, dim) exponents of the monomials that the shape functions span
 
     @property
@@ -70,12 +82,39 @@ class Element:
         """Corner nodes per cell; they come first in both numberings."""
         return len(self.cell.corners)
 
+    def corner_values(self) -> Floats:
+        """Shape functions of the cell's corners alone, degree 1, at all nodes (nodes, corners)."""
+        powers = _span(self.cell, 1, full=True)
+        corners = np.linalg.inv(_monomials(self.points[: self.corners], powers))
+        return np.asarray(_monomials(self.points, powers) @ corners, dtype=float)
+
+    def values(self, at: npt.ArrayLike) -> Floats:
+        """Shape functions (q, nodes), nodes in VTK order, at (q, dim)."""
+        monomials = _monomials(np.asarray(at, dtype=float), self.powers)
+        result: Floats = monomials @ self._coefficients()
+        return result
+
     def gradients(self, at: npt.ArrayLike) -> Floats:
         """Shape functions' reference gradients (q, nodes, dim), nodes in VTK order, at (q, dim)."""
-        coefficients = np.linalg.inv(_monomials(self.points, self.powers))
         slopes = _monomial_slopes(np.asarray(at, dtype=float), self.powers)
-        result: Floats = np.einsum("qmd,mn->qnd", slopes, coefficients)
+        result: Floats = np.einsum("qmd,mn->qnd", slopes, self._coefficients())
         return result
+
+    def carried(self, places: Floats, at: Floats) -> Floats:
+        """Values at points ``places`` (q, dim) → values at ``at`` (r, dim), a matrix (r, q).
+
+        Least squares by the shape functions' monomials, or by fewer (those of the corners alone, a
+        constant) where the points do not tell them apart.
+        """
+        spans = (self.powers, _span(self.cell, 1, True), np.zeros((1, self.cell.dim), np.intp))
+        told_apart = (s for s in spans if np.linalg.matrix_rank(_monomials(places, s)) == len(s))
+        span = next(told_apart)
+        fit = np.linalg.pinv(_monomials(places, span))
+        return np.asarray(_monomials(at, span) @ fit, dtype=float)
+
+    def _coefficients(self) -> Floats:
+        """Monomials' coefficients (m, nodes) in each shape function."""
+        return np.asarray(np.linalg.inv(_monomials(self.points, self.powers)), dtype=float)
 
 
 def _monomials(points: Floats, powers: Ints) -> Floats:
@@ -93,59 +132,94 @@ def _monomial_slopes(points: Floats, powers: Ints) -> Floats:
     return np.stack(slopes, axis=2)
 
 
-def _span(cell: Cell, degree: int) -> Ints:
-    """Exponents: total degree on a simplex; superlinear degree (serendipity) on the others."""
+def _span(cell: Cell, degree: int, full: bool) -> Ints:
+    """Exponents of the shape functions' monomials.
+
+    Total degree on a simplex; products of a triangle's and an interval's on a prism; on a cube
+    products (``full``) or superlinear degree (serendipity; at degree 1 they are the same).
+    """
 
     def order(exponents: Sequence[int]) -> int:
-        return sum(e for e in exponents if cell.is_simplex or e != 1)
+        if cell.is_simplex:
+            return sum(exponents)
+        if cell.is_cube:
+            return max(exponents) if full else sum(e for e in exponents if e != 1)
+        return sum(exponents[:2])
 
     every = product(range(degree + 1), repeat=cell.dim)
     return np.array([e for e in every if order(e) <= degree], dtype=np.intp)
 
 
-def _edge_numbers(edges: Pairs, wanted: Iterable[tuple[int, int]]) -> list[int]:
-    """Position in ``edges`` of each wanted edge, whatever its direction."""
-    number = {frozenset(edge): i for i, edge in enumerate(edges)}
-    return [number[frozenset(edge)] for edge in wanted]
-
-
-def _permutation(cell: Cell, degree: int) -> list[int]:
-    """VTK number of each kernel node: vertices, then at degree 2 one node an edge."""
-    vertices = list(cell.from_vtk)
+def _entities(cell: Cell, degree: int, full: bool) -> tuple[Corners, ...]:
+    """Corners of the sub-entity that each node is the middle of, in VTK order."""
+    corners = tuple((c,) for c in range(len(cell.corners)))
     if degree == 1:
-        return vertices
-    wanted = [(vertices[a], vertices[b]) for a, b in cell.kernel_edges]
-    return vertices + [len(vertices) + e for e in _edge_numbers(cell.edges, wanted)]
+        return corners
+    faces = tuple(f for f in cell.facets if len(f) == 4 and full)
+    whole = (tuple(range(len(cell.corners))),) if cell.is_cube and full else ()
+    return corners + cell.edges + faces + whole
 
 
-def _facet(cell: Cell, degree: int, loop: tuple[int, ...]) -> list[int]:
-    """Nodes of one facet: its corners, then at degree 2 the midpoints along the same loop."""
-    if degree == 1:
-        return list(loop)
-    wanted = zip(loop, (*loop[1:], loop[0]), strict=True)
-    return [*loop, *(len(cell.corners) + e for e in _edge_numbers(cell.edges, wanted))]
+def _from_vtk(cell: Cell, entities: Sequence[Corners]) -> list[int]:
+    """VTK number of each kernel node.
+
+    Basix sorts vertices by their coordinates, last axis first, and sub-entities of each dimension
+    by their vertices: forwards, but backwards on simplices.
+    """
+    vertices = sorted(range(len(cell.corners)), key=lambda c: cell.corners[c][::-1])
+    number = {corner: vertex for vertex, corner in enumerate(vertices)}
+
+    def place(node: int) -> tuple[int, list[int]]:
+        own = sorted(number[c] for c in entities[node])
+        backwards = cell.is_simplex and len(own) > 1
+        return len(own), [-v for v in own] if backwards else own
+
+    return sorted(range(len(entities)), key=place)
 
 
-def _element(name: str, meshio: str, cell: Cell, degree: int, facet: str = "") -> Element:
-    """Derive the tables of one element; they are shared, so they are read-only."""
+def _facets(entities: Sequence[Corners], loops: Sequence[Corners], own: Sequence[Element]) -> Ints:
+    """Nodes of each facet: those of its element, found in the cell by the corners they lie between.
+
+    Args:
+        entities: of the cell; loops: corners of each facet; own: element of each facet.
+    """
+    node = {frozenset(entity): i for i, entity in enumerate(entities)}
+    width = max((element.nodes for element in own), default=0)
+    table = np.full((len(loops), width), NO_NODE, dtype=np.intp)
+    for row, loop, element in zip(table, loops, own, strict=True):
+        row[: element.nodes] = [node[frozenset(loop[c] for c in e)] for e in element.entities]
+    return table
+
+
+def _element(
+    name: str, meshio: str, cell: Cell, degree: int, full: bool = False, facets: str = ""
+) -> Element:
+    """Derive the tables of one element; they are shared, so they are read-only.
+
+    Args:
+        full: nodes also at the middles of quadrilaterals and cubes.
+        facets: names of the facets' elements, by their number of corners.
+    """
+    kinds = {FACETS[kind].corners: FACETS[kind] for kind in facets.split()}
+    entities = _entities(cell, degree, full)
     corners = np.array(cell.corners, dtype=float)
-    middles = corners[np.array(cell.edges)].mean(axis=1)
-    from_vtk = np.array(_permutation(cell, degree), dtype=np.intp)
-    facets = np.array([_facet(cell, degree, loop) for loop in cell.facets], dtype=np.intp)
-    points = corners if degree == 1 else np.vstack([corners, middles])
+    from_vtk = np.array(_from_vtk(cell, entities), dtype=np.intp)
+    loops = cell.facets if kinds else ()
     element = Element(
         name=name,
         meshio=meshio,
         cell=cell,
         degree=degree,
-        facet=facet,
-        points=points,
+        entities=entities,
+        points=np.array([corners[list(entity)].mean(axis=0) for entity in entities]),
         from_vtk=from_vtk,
         to_vtk=np.argsort(from_vtk),
-        facets=facets,
-        powers=_span(cell, degree),
+        facet_elements=tuple(kind.name for kind in kinds.values()),
+        facets=_facets(entities, loops, [kinds[len(loop)] for loop in loops]),
+        powers=_span(cell, degree, full),
     )
-    for table in (points, from_vtk, element.to_vtk, facets, element.powers):
+    tables = (element.points, from_vtk, element.to_vtk, element.facets, element.powers)
+    for table in tables:
         table.flags.writeable = False
     return element
 
@@ -153,25 +227,19 @@ def _element(name: str, meshio: str, cell: Cell, degree: int, facet: str = "") -
 TRIANGLE = Cell(
     name="triangle",
     corners=((0, 0), (1, 0), (0, 1)),
-    from_vtk=(0, 1, 2),
     edges=((0, 1), (1, 2), (2, 0)),
-    kernel_edges=((1, 2), (0, 2), (0, 1)),
     facets=(),
 )
 QUADRILATERAL = Cell(
     name="quadrilateral",
     corners=((0, 0), (1, 0), (1, 1), (0, 1)),
-    from_vtk=(0, 1, 3, 2),
     edges=((0, 1), (1, 2), (2, 3), (3, 0)),
-    kernel_edges=((0, 1), (0, 2), (1, 3), (2, 3)),
     facets=(),
 )
 TETRAHEDRON = Cell(
     name="tetrahedron",
     corners=((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    from_vtk=(0, 1, 2, 3),
     edges=((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    kernel_edges=((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)),
     facets=((0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)),
 )
 HEXAHEDRON = Cell(
@@ -180,31 +248,21 @@ HEXAHEDRON = Cell(
         *((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)),
         *((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
     ),
-    from_vtk=(0, 1, 3, 2, 4, 5, 7, 6),
     edges=(
         *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
         *((0, 4), (1, 5), (2, 6), (3, 7)),
-    ),
-    kernel_edges=(
-        *((0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3)),
-        *((2, 6), (3, 7), (4, 5), (4, 6), (5, 7), (6, 7)),
     ),
     facets=(
         *((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4)),
         *((3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)),
     ),
 )
-
-#: Volume elements by name.
-ELEMENTS = {
-    element.name: element
-    for element in (
-        _element("P1", "tetra", TETRAHEDRON, 1, facet="T1"),
-        _element("P2", "tetra10", TETRAHEDRON, 2, facet="T2"),
-        _element("Q1", "hexahedron", HEXAHEDRON, 1, facet="S1"),
-        _element("Q2", "hexahedron20", HEXAHEDRON, 2, facet="S2"),
-    )
-}
+PRISM = Cell(
+    name="prism",
+    corners=((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)),
+    edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+)
 
 #: Facet elements by name.
 FACETS = {
@@ -214,5 +272,20 @@ FACETS = {
         _element("T2", "triangle6", TRIANGLE, 2),
         _element("S1", "quad", QUADRILATERAL, 1),
         _element("S2", "quad8", QUADRILATERAL, 2),
+        _element("S2L", "quad9", QUADRILATERAL, 2, full=True),
+    )
+}
+
+#: Volume elements by name.
+ELEMENTS = {
+    element.name: element
+    for element in (
+        _element("P1", "tetra", TETRAHEDRON, 1, facets="T1"),
+        _element("P2", "tetra10", TETRAHEDRON, 2, facets="T2"),
+        _element("Q1", "hexahedron", HEXAHEDRON, 1, facets="S1"),
+        _element("Q2", "hexahedron20", HEXAHEDRON, 2, facets="S2"),
+        _element("Q2L", "hexahedron27", HEXAHEDRON, 2, full=True, facets="S2L"),
+        _element("Pr1", "wedge", PRISM, 1, facets="T1 S1"),
+        _element("Pr2", "wedge18", PRISM, 2, full=True, facets="T2 S2L"),
     )
 }

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .kinematics import Kinematics
+from .membrane_kinematics import SurfaceKinematics
 from .reader import EnergyFileError, Law, blamed
 from .tensors import Tensor
 
@@ -18,10 +19,25 @@ _EDGES = np.array([[1.0, 0.2, 0.1], [0.1, 0.9, 0.3], [0.0, 0.2, 1.1]])
 
 def energy_at(law: Law, F: np.ndarray, values: dict[str, Any], edges: Any = _EDGES) -> float:
     """ψ, Pa, of the deformation gradient ``F`` (3, 3) and parameters name → value."""
-    tensors = {n: np.asarray(v).view(Tensor) if np.ndim(v) else v for n, v in values.items()}
     k = Kinematics(np.asarray(F, float).view(Tensor), np.asarray(edges).view(Tensor))
     with blamed(law), np.errstate(all="ignore"):  # NaN is refused by its caller
-        psi = law.psi(k, tensors)
+        psi = law.psi(k, _tensors(values))
+    return _scalar(law, psi)
+
+
+def skin_energy_at(law: Law, stretches: tuple[float, float], values: dict[str, Any]) -> float:
+    """ψ, Pa, of a skin with two principal stretches in its plane."""
+    k = SurfaceKinematics(np.diag(np.square(stretches)).view(Tensor))
+    with blamed(law), np.errstate(all="ignore"):
+        psi = law.psi_incompressible(k, _tensors(values))
+    return _scalar(law, psi)
+
+
+def _tensors(values: dict[str, Any]) -> dict[str, Any]:
+    return {n: np.asarray(v, float).view(Tensor) if np.ndim(v) else v for n, v in values.items()}
+
+
+def _scalar(law: Law, psi: Any) -> float:
     if np.ndim(psi) != 0 or callable(psi):
         raise EnergyFileError(
             f"{law.path}:{law.line}: the energy is not a scalar but has shape {np.shape(psi)}; "
@@ -39,6 +55,16 @@ def stress_at(law: Law, F: np.ndarray, values: dict[str, Any], step: float = 1e-
         difference = energy_at(law, F + d, values) - energy_at(law, F - d, values)
         stress[i, j] = difference / (2 * step)
     return stress
+
+
+def rest_stress(law: Law, values: dict[str, Any]) -> np.ndarray:
+    """P (3, 3), Pa, at F = I.
+
+    Extrapolated from two steps, since fibres that only pull make the energy's curvature jump there
+    and central differences then err at first order.
+    """
+    wide, narrow = (stress_at(law, np.eye(3), values, step) for step in (1e-5, 5e-6))
+    return np.asarray(2 * narrow - wide)
 
 
 def stiffness_scale(law: Law, values: dict[str, Any]) -> float:
@@ -68,6 +94,13 @@ def require_sound(law: Law) -> None:
         EnergyFileError: one sentence with the figure found; declared exceptions are let pass.
     """
     values = {p.name: p.default for p in law.parameters}
+    if law.solid:
+        _require_solid(law, values)
+    if law.surface:
+        _require_skin(law, values)
+
+
+def _require_solid(law: Law, values: dict[str, Any]) -> None:
     scale = stiffness_scale(law, values)
     if not np.isfinite(scale) or scale == 0.0:
         raise EnergyFileError(
@@ -86,7 +119,7 @@ def _require_stress_free(law: Law, values: dict[str, Any], scale: float) -> None
         raise EnergyFileError(
             f"{law.path}:{law.line}: psi at F = I is {psi:.6g} Pa, not 0; {declare}"
         )
-    stress = np.abs(stress_at(law, np.eye(3), values)).max()
+    stress = np.abs(rest_stress(law, values)).max()
     if stress > 1e-6 * scale:
         raise EnergyFileError(
             f"{law.path}:{law.line}: the stress at F = I is {stress:.6g} Pa, not 0; {declare}"
@@ -105,4 +138,32 @@ def _require_objective(law: Law, values: dict[str, Any], scale: float) -> None:
                 f"{law.path}:{law.line}: is not objective: a rotation changes psi from "
                 f"{psi:.6g} to {turned:.6g} Pa; write it in C, its invariants or E, or declare "
                 'exceptions = {"objective"}.'
+            )
+
+
+def _require_skin(law: Law, values: dict[str, Any]) -> None:
+    """ψ_surface(I) = 0, and no lateral tension at the width 1/√λ, where the skin folds."""
+
+    def energy(*stretches: float) -> float:
+        return skin_energy_at(law, stretches, values)  # type: ignore[arg-type]
+
+    h = 1e-3
+    scale = (energy(1 + h, 1 + h) + energy(1 - h, 1 - h) - 2 * energy(1.0, 1.0)) / h**2
+    if not np.isfinite(scale) or scale <= 0.0:
+        raise EnergyFileError(
+            f"{law.path}:{law.line}: psi_surface has no finite stiffness at rest; check it."
+        )
+    if abs(energy(1.0, 1.0)) > 1e-10 * scale:
+        raise EnergyFileError(
+            f"{law.path}:{law.line}: psi_surface at rest is {energy(1.0, 1.0):.6g} Pa, not 0; "
+            "subtract its value there."
+        )
+    for stretch in (1.0, 1.1):
+        width, h = stretch**-0.5, 1e-5
+        lateral = (energy(stretch, width + h) - energy(stretch, width - h)) / (2 * h)
+        if abs(lateral) > 1e-6 * scale:
+            raise EnergyFileError(
+                f"{law.path}:{law.line}: psi_surface has a lateral tension of {lateral:.6g} Pa at "
+                f"the stretches {stretch:g} and {width:.4g}, where a skin that keeps its volume "
+                "has none; write it in k.I1_s + 1/k.J_s**2."
             )

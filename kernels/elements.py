@@ -11,17 +11,20 @@ import basix.ufl
 import numpy as np
 import ufl
 
-#: name → (Basix cell, degree, gdim is 3 for all). T and S are the facets of P and Q elements.
-CELLS = {
-    "P1": ("tetrahedron", 1), "P2": ("tetrahedron", 2),
-    "Q1": ("hexahedron", 1), "Q2": ("hexahedron", 2),
-    "T1": ("triangle", 1), "T2": ("triangle", 2),
-    "S1": ("quadrilateral", 1), "S2": ("quadrilateral", 2),
+from . import cells
+from .degree import scheme_of
+
+#: Every element by name: cells and facets.
+TABLES = cells.ELEMENTS | cells.FACETS
+#: Degree of the stiffness' quadrature (points: 1, 4, 8, 27, 27, 6, 18 and 1, 3, 4, 9, 9).
+STIFFNESS_DEGREE = {
+    "P1": 1, "P2": 2, "Q1": 2, "Q2": 4, "Q2L": 4, "Pr1": 2, "Pr2": 4,
+    "T1": 1, "T2": 2, "S1": 2, "S2": 4, "S2L": 4,
 }  # fmt: skip
-#: Degree of the stiffness' quadrature (points: 1, 4, 8, 27 and 1, 3, 4, 9).
-STIFFNESS_DEGREE = {"P1": 1, "P2": 2, "Q1": 2, "Q2": 4, "T1": 1, "T2": 2, "S1": 2, "S2": 4}
-#: Degree of the loads' quadrature: at least twice the element's degree.
-LOAD_DEGREE = {"P1": 2, "P2": 4, "Q1": 2, "Q2": 4, "T1": 2, "T2": 4, "S1": 2, "S2": 4}
+#: Degree of a mixed form's quadrature (points: 14 and 27), by its displacement's element.
+MIXED_DEGREE = {"P2": 4, "Q2L": 4}
+#: Degree of the loads' quadrature: twice the element's degree.
+LOAD_DEGREE = {name: 2 * table.degree for name, table in TABLES.items()}
 
 
 @dataclass(frozen=True)
@@ -42,13 +45,47 @@ class Space:
         return ufl.Coefficient(ufl.FunctionSpace(self.mesh, element))
 
 
+@dataclass(frozen=True)
+class MixedSpace:
+    """Displacement on an isoparametric element with a continuous pressure of one degree less."""
+
+    name: str
+    mesh: Any
+    unknown: Any  # displacement, then the pressures of the corners
+    test_all: Any
+    trial: Any
+    pressures: int  # of a cell
+
+    @property
+    def displacement(self) -> Any:
+        """u of the unknown."""
+        return ufl.split(self.unknown)[0]
+
+    @property
+    def pressure(self) -> Any:
+        """p of the unknown."""
+        return ufl.split(self.unknown)[1]
+
+    @property
+    def test(self) -> Any:
+        """Displacement's part of the test function."""
+        return ufl.split(self.test_all)[0]
+
+    @property
+    def pressure_test(self) -> Any:
+        """Pressure's part of the test function."""
+        return ufl.split(self.test_all)[1]
+
+    field = Space.field
+
+
 @cache
 def scalar_element(name: str) -> Any:
-    """The scalar Basix element of a name in CELLS; nodal in every case."""
-    cell, degree = CELLS[name]
+    """The scalar Basix element of a name in TABLES; nodal in every case."""
+    table = TABLES[name]
     if name in ("Q2", "S2"):
-        return _nodal_serendipity(cell)
-    return basix.ufl.element("P", cell, degree)
+        return _nodal_serendipity(table.cell.name)
+    return basix.ufl.element("P", table.cell.name, table.degree)
 
 
 def space(name: str) -> Space:
@@ -59,10 +96,38 @@ def space(name: str) -> Space:
     return Space(name, mesh, ufl.Coefficient(V), ufl.TestFunction(V), ufl.TrialFunction(V))
 
 
+def mixed_space(name: str) -> MixedSpace:
+    """Taylor and Hood's pair on the element ``name``."""
+    element = basix.ufl.blocked_element(scalar_element(name), shape=(3,))
+    mesh = ufl.Mesh(element)
+    pressure = basix.ufl.element("P", TABLES[name].cell.name, 1)
+    V = ufl.FunctionSpace(mesh, basix.ufl.mixed_element([element, pressure]))
+    unknowns = ufl.Coefficient(V), ufl.TestFunction(V), ufl.TrialFunction(V)
+    return MixedSpace(name, mesh, *unknowns, pressure.dim)
+
+
+@cache
 def quadrature(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (q, tdim) and weights (q,) of the default rule, on the reference cell."""
-    cell = basix.CellType[CELLS[name][0]]
-    points, weights = basix.make_quadrature(cell, degree)
+    """Points (q, tdim) and weights (q,) on the reference cell; ``degree`` may name its scheme.
+
+    A prism takes the product of a triangle's rule and Gauss': Basix' own prism rules are collapsed.
+    Where Basix' default has negative weights (tetrahedra, degrees 3, 7 and 8), that of Xiao and
+    Gimbutas (2010, Comput. Math. Appl. 59) of the same degree stands in.
+    """
+    cell, scheme = TABLES[name].cell.name, scheme_of(degree)
+    if cell != "prism":
+        return _rule(cell, degree, scheme)
+    flat, flat_weights = _rule("triangle", degree, scheme)
+    high, high_weights = _rule("interval", degree, "default")
+    points = [[*xy, z] for z in high[:, 0] for xy in flat]
+    return np.array(points), np.outer(high_weights, flat_weights).ravel()
+
+
+def _rule(cell: str, degree: int, scheme: str) -> tuple[np.ndarray, np.ndarray]:
+    kind, rule = basix.CellType[cell], basix.QuadratureType[scheme]
+    points, weights = basix.make_quadrature(kind, int(degree), rule)
+    if scheme == "default" and np.min(weights) < 0:
+        return _rule(cell, degree, "xiao_gimbutas")
     return np.asarray(points), np.asarray(weights)
 
 

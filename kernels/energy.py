@@ -13,7 +13,11 @@ import numpy as np
 
 from .kinematics import Kinematics
 from .tensors import (
+    Ei,
+    axes,
+    choose,
     cos,
+    cross,
     det,
     dot,
     exp,
@@ -31,13 +35,17 @@ from .tensors import (
 
 __all__ = [  # what an energy file may import
     "Direction",
+    "Ei",
     "Kinematics",
     "Metre",
     "Number",
     "Pa",
     "Ratio",
     "Volumetric",
+    "axes",
+    "choose",
     "cos",
+    "cross",
     "det",
     "dot",
     "exp",
@@ -62,7 +70,8 @@ __all__ = [  # what an energy file may import
 class Kind:
     """Type of a parameter: its unit and its open or closed bounds.
 
-    Called, it gives the same type with other bounds: ``c2: Pa(minimum=0.0) = 1e3``.
+    Called, it gives the same type with other bounds: ``c2: Pa(minimum=0.0) = 1e3``, both closed;
+    ``Number(above=0.0)`` is open, and ``Pa(signed=True)`` has no lower one.
     """
 
     name: str
@@ -72,22 +81,45 @@ class Kind:
     open: bool = True  # the bounds themselves are outside
     size: int = 1
 
-    def __call__(self, minimum: float | None = None, maximum: float | None = None) -> Kind:
-        low = self.minimum if minimum is None else float(minimum)
+    def __call__(
+        self,
+        minimum: float | None = None,
+        maximum: float | None = None,
+        *,
+        above: float | None = None,
+        signed: bool = False,
+    ) -> Kind:
+        if above is not None:
+            if minimum is not None or maximum is not None:
+                raise ValueError("above stands alone")
+            return replace(self, minimum=float(above), maximum=math.inf, open=True)
+        low = -math.inf if signed else self.minimum if minimum is None else float(minimum)
         high = self.maximum if maximum is None else float(maximum)
         return replace(self, minimum=low, maximum=high, open=False)
 
     def admits(self, value: Any) -> bool:
-        """True where every entry of ``value`` is finite and inside the bounds."""
+        """True where every entry of ``value`` is finite and inside the bounds.
+
+        A direction, one in each row, must not be zero.
+        """
         v = np.asarray(value, dtype=float)
+        if self.size > 1:
+            return bool(np.isfinite(v).all() and (abs(v).max(axis=-1) > 0).all())
         if self.open:
             inside = (v > self.minimum) & (v < self.maximum)
         else:
             inside = (v >= self.minimum) & (v <= self.maximum)
         return bool(np.all(np.isfinite(v) & inside))
 
+    def normalised(self, value: Any) -> tuple[float, ...]:
+        """One direction as a unit vector."""
+        v = np.asarray(value, dtype=float) / np.max(np.abs(value))
+        return tuple(float(x) for x in v / np.linalg.norm(v))
+
     def range(self) -> str:
         """The bounds in words, for messages."""
+        if self.size > 1:
+            return "three numbers, not all 0"
         left, right = ("(", ")") if self.open else ("[", "]")
         return f"{left}{self.minimum:g}, {self.maximum:g}{right}"
 

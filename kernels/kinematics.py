@@ -12,6 +12,12 @@ import numpy as np
 
 from . import tensors as e
 
+_IN_PLANE = "k.{} is of a membrane's plane; use it in psi_surface, and k.I1 or k.J in a solid."
+
+
+class Unavailable(Exception):
+    """A word that this kinematics does not have: half a sentence with the remedy."""
+
 
 class Kinematics:
     """Tensors and invariants of one deformation gradient.
@@ -48,6 +54,16 @@ class Kinematics:
         return 0.5 * (self.C - _identity_like(self.C))
 
     @cached_property
+    def E_bar(self) -> Any:
+        """(J^(-2/3) C - I)/2, the strain without its change of volume."""
+        return 0.5 * (self.J ** (-2.0 / 3.0) * self.C - _identity_like(self.C))
+
+    @cached_property
+    def small_strain(self) -> Any:
+        """sym(F) - I, not objective."""
+        return e.sym(self.F) - _identity_like(self.C)
+
+    @cached_property
     def J(self) -> Any:
         """det F."""
         return e.det(self._F) if self._J is None else self._J
@@ -81,9 +97,48 @@ class Kinematics:
         """f·C f, the squared stretch of the fibre direction ``f`` (3,)."""
         return e.dot(f, self.C * f)
 
+    def I4_bar(self, f: Any) -> Any:
+        """J^(-2/3) I4."""
+        return self.J ** (-2.0 / 3.0) * self.I4(f)
+
+    def I5(self, f: Any) -> Any:
+        """f·C² f."""
+        return e.inner(self.C * f, self.C * f)
+
     def I8(self, f: Any, s: Any) -> Any:
         """f·C s."""
         return e.dot(f, self.C * s)
+
+    @property
+    def I1_s(self) -> Any:
+        """tr C of a membrane, in its plane."""
+        raise Unavailable(_IN_PLANE.format("I1_s"))
+
+    @property
+    def J_s(self) -> Any:
+        """Area ratio of a membrane."""
+        raise Unavailable(_IN_PLANE.format("J_s"))
+
+    def stretch_sum(self, alpha: Any) -> Any:
+        """λ1^α + λ2^α + λ3^α, any real α, with exact derivatives where stretches coincide."""
+        if self._spectrum is None:
+            return (_squared_stretches(self.C) ** (0.5 * alpha)).sum()
+        return self._spectrum.powers(alpha)
+
+    @cached_property
+    def log_stretch_squares(self) -> Any:
+        """ln²λ1 + ln²λ2 + ln²λ3, with exact derivatives where stretches coincide."""
+        if self._spectrum is None:
+            return (0.25 * np.log(_squared_stretches(self.C)) ** 2).sum()
+        return self._spectrum.squared_logarithms()
+
+    @cached_property
+    def _spectrum(self) -> Any:
+        if not e.is_symbolic(self.C):
+            return None
+        from .spectral import Spectrum
+
+        return Spectrum(self.C)
 
     @cached_property
     def trace_U(self) -> Any:
@@ -141,13 +196,18 @@ def _identity_like(a: Any) -> Any:
     return e.identity()
 
 
-def _trace_of_stretch(C: np.ndarray, J: float) -> float:
-    stretches = np.sqrt(np.maximum(np.linalg.eigvalsh(C), 0.0))
+def _squared_stretches(C: np.ndarray) -> np.ndarray:
+    return np.maximum(np.linalg.eigvalsh(np.asarray(C)), 0.0)
+
+
+def _trace_of_stretch(C: np.ndarray, J: float) -> np.float64:
+    stretches = np.sqrt(_squared_stretches(C))
     stretches[0] *= np.sign(J) if J < 0 else 1.0
-    return float(stretches.sum())
+    return np.float64(stretches.sum())
 
 
-def _matrix(rows: list[list[Any]], like: Any) -> Any:
+def matrix(rows: list[list[Any]], like: Any) -> Any:
+    """(n, n) of scalars: UFL if ``like`` is, otherwise numbers."""
     if e.is_symbolic(like):
         import ufl
 
@@ -162,7 +222,7 @@ def _cholesky_upper(a: Any) -> Any:
     r11 = e.sqrt(a[1, 1] - r01**2)
     r12 = (a[1, 2] - r01 * r02) / r11
     r22 = e.sqrt(a[2, 2] - r02**2 - r12**2)
-    return _matrix([[r00, r01, r02], [0, r11, r12], [0, 0, r22]], a)
+    return matrix([[r00, r01, r02], [0, r11, r12], [0, 0, r22]], a)
 
 
 def _inverse_upper(r: Any) -> Any:
@@ -170,4 +230,4 @@ def _inverse_upper(r: Any) -> Any:
     i01 = -r[0, 1] * i0 * i1
     i12 = -r[1, 2] * i1 * i2
     i02 = (r[0, 1] * r[1, 2] * i1 - r[0, 2]) * i0 * i2
-    return _matrix([[i0, i01, i02], [0, i1, i12], [0, 0, i2]], r)
+    return matrix([[i0, i01, i02], [0, i1, i12], [0, 0, i2]], r)

@@ -13,6 +13,7 @@ from types import CodeType
 from typing import Any
 
 from . import energy
+from .kinematics import Unavailable
 
 #: Properties of an energy that a file may declare not to have; tests then demand their absence.
 EXCEPTIONS = ("stress_free", "objective", "isotropic", "barrier")
@@ -33,6 +34,8 @@ def blamed(law: Law) -> Iterator[None]:
         yield
     except EnergyFileError:
         raise
+    except Unavailable as problem:
+        raise EnergyFileError(f"{law.path}:{law.line}: {problem}") from None
     except Exception as problem:
         frames = traceback.extract_tb(problem.__traceback__)
         line = next((f.lineno for f in frames[::-1] if f.filename == str(law.path)), law.line)
@@ -85,6 +88,16 @@ class Law:
         exec(self._code, space)  # every node was checked against the whitelist
         return {n: space[n] for n in ENTRY_POINTS if callable(space.get(n))}
 
+    @property
+    def solid(self) -> bool:
+        """Whether it has an energy per volume; one with psi_surface alone is a skin's."""
+        return bool({"psi", "psi_dev"} & set(self._functions))
+
+    @property
+    def surface(self) -> bool:
+        """Whether it has an energy of its own for a skin."""
+        return "psi_surface" in self._functions
+
     def arguments(self, function: str, values: dict[str, Any]) -> dict[str, Any]:
         """Those of ``values`` (name → value) that ``function`` takes."""
         names = inspect.signature(self._functions[function]).parameters
@@ -93,9 +106,37 @@ class Law:
     def psi(self, k: Any, values: dict[str, Any]) -> Any:
         """ψ per rest volume, Pa, at the kinematics ``k`` with parameters name → value."""
         f = self._functions
+        if not self.solid:
+            raise EnergyFileError(
+                f"{self.path}:{self.line}: {self.name} is a skin's energy (psi_surface alone); "
+                "give it to body.skin, or define psi(k, ...) for a solid."
+            )
         if "psi" in f:
             return f["psi"](k, **self.arguments("psi", values))
         return f["psi_dev"](k, **self.arguments("psi_dev", values)) + self.psi_vol(k.J, values).U
+
+    def psi_dev(self, k: Any, values: dict[str, Any]) -> Any:
+        """The isochoric part of a law that gives its parts, Pa.
+
+        Raises:
+            EnergyFileError: the law gives its energy as a whole.
+        """
+        if not self.is_split:
+            raise EnergyFileError(
+                f"{self.path}:{self.line}: {self.name} gives psi as a whole; a mixed or "
+                "mean-dilatation formulation needs psi_dev(k, ...) and psi_vol(J, ...)."
+            )
+        return self._functions["psi_dev"](k, **self.arguments("psi_dev", values))
+
+    @property
+    def is_split(self) -> bool:
+        """Whether the law gives psi_dev and psi_vol, as nearly incompressible ones do."""
+        return {"psi_dev", "psi_vol"} <= set(self._functions)
+
+    def psi_mixed(self, k: Any, p: Any, values: dict[str, Any]) -> Any:
+        """psi_dev + p g(J) - U*(p), Pa; Mazier 2022, eqs. 38 and 41."""
+        volumetric = self.psi_vol(k.J, values)
+        return self.psi_dev(k, values) + p * volumetric.g - volumetric.conjugate(p)
 
     def psi_vol(self, J: Any, values: dict[str, Any]) -> energy.Volumetric:
         """The volumetric part of a nearly incompressible law."""
@@ -114,4 +155,4 @@ class Law:
         for name in ("psi_surface", "psi_dev", "psi"):
             if name in f:
                 return f[name](k, **self.arguments(name, values))
-        raise AssertionError("read() demands psi or psi_dev")
+        raise AssertionError("read() demands psi, psi_dev or psi_surface")

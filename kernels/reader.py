@@ -14,6 +14,8 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from . import energy
 from .kinematics import ATTRIBUTES
 from .law import BUILTINS, ENTRY_POINTS, EXCEPTIONS, EnergyFileError, Law, Parameter, blamed
@@ -22,7 +24,7 @@ __all__ = ["EnergyFileError", "Law", "Parameter", "blamed", "nearest", "read"]
 
 #: Names that a parameter may not have: the kernels' own fields and the arguments of `supple.Body`.
 RESERVED = ("u", "thickness", "mesh", "material", "formulation", "density", "quadrature", "where",
-            "cells", "number")  # fmt: skip
+            "cells", "number", "points", "gravity", "traction", "pressure", "skin")  # fmt: skip
 #: Powers and ranges of plain numbers stay small: reading a file cannot take long.
 LARGEST_EXPONENT, LONGEST_RANGE = 64, 1000
 
@@ -94,11 +96,11 @@ class _Checker:
             raise self.fail(self.tree, "has no docstring; begin with its formula and source.")
         for node in self.tree.body[1:]:
             self.statement(node)
-        if not {"psi", "psi_dev"} & set(self.functions):
+        if not {"psi", "psi_dev", "psi_surface"} & set(self.functions):
             raise self.fail(
                 self.tree, "defines no energy; define psi(k, ...), or psi_dev and psi_vol."
             )
-        if "psi" not in self.functions and "psi_vol" not in self.functions:
+        if "psi_dev" in self.functions and not {"psi", "psi_vol"} & set(self.functions):
             raise self.fail(self.tree, "defines psi_dev without psi_vol; add psi_vol(J, ...).")
         for f in self.functions.values():
             self.function(f)
@@ -234,9 +236,11 @@ class _Checker:
             )
         value = self.number(argument, f"the default of {name}", default)
         kind = self.kind(argument.annotation, name)
+        if np.shape(value) != ((kind.size,) if kind.size > 1 else ()):
+            raise self.fail(argument, f"the default of {name} must be {kind.size} number(s).")
         if not kind.admits(value):
             raise self.fail(argument, f"the default of {name} is {value}, outside {kind.range()}.")
-        return Parameter(name, kind, value)
+        return Parameter(name, kind, kind.normalised(value) if kind.size > 1 else value)
 
     def kind(self, annotation: ast.expr, name: str) -> energy.Kind:
         call = annotation if isinstance(annotation, ast.Call) else None

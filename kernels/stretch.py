@@ -5,29 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import ufl
-from ffcx.codegeneration import lnodes
-from ufl.constantvalue import as_ufl
-from ufl.core.ufl_type import ufl_type
-from ufl.mathfunctions import MathFunction
 
-#: What a kernel's source needs to call a `Frozen`.
-FROZEN_IN_C = "static inline double frozen(double x) { return x; }"
-
-
-@ufl_type()
-class Frozen(MathFunction):
-    """A value without a derivative; in C the function of FROZEN_IN_C."""
-
-    __slots__ = ()
-
-    def __init__(self, argument: Any) -> None:
-        MathFunction.__init__(self, "frozen", argument)
-
-    def derivative(self) -> Any:
-        return as_ufl(0.0)
-
-
-lnodes._ufl_call_lookup[Frozen] = lnodes._math_function
+from .functions import Frozen
 
 
 def trace_seed(I1: Any, I2: Any, J: Any) -> Any:

@@ -1,4 +1,7 @@
-"""Operations that an energy may use, on UFL expressions (kernels) and on numbers (checks) alike."""
+"""Operations that an energy may use, on UFL expressions (kernels) and on numbers (checks) alike.
+
+Numbers are NumPy's: past their range they become infinite, where Python's own would raise.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +55,7 @@ def tr(a: Any) -> Any:
         import ufl
 
         return ufl.tr(a)
-    return float(np.trace(a))
+    return np.float64(np.trace(a))
 
 
 def det(a: Any) -> Any:
@@ -61,7 +64,7 @@ def det(a: Any) -> Any:
         import ufl
 
         return ufl.det(a)
-    return float(np.linalg.det(a))
+    return np.float64(np.linalg.det(a))
 
 
 def inner(a: Any, b: Any) -> Any:
@@ -70,7 +73,7 @@ def inner(a: Any, b: Any) -> Any:
         import ufl
 
         return ufl.inner(a, b)
-    return float(np.sum(np.asarray(a) * np.asarray(b)))
+    return np.float64(np.sum(np.asarray(a) * np.asarray(b)))
 
 
 def dot(a: Any, b: Any) -> Any:
@@ -99,6 +102,42 @@ def positive(x: Any) -> Any:
 
         return ufl.conditional(ufl.gt(x, 0.0), x, 0.0)
     return max(float(x), 0.0)
+
+
+def choose(test: Any, a: Any, b: Any) -> Any:
+    """``a`` where ``test`` > 0, otherwise ``b``."""
+    if is_symbolic(test):
+        import ufl
+
+        return ufl.conditional(ufl.gt(test, 0.0), a, b)
+    return a if test > 0 else b
+
+
+def Ei(x: Any) -> Any:
+    """Exponential integral of x > 0."""
+    if is_symbolic(x):
+        from .functions import ExponentialIntegral
+
+        return ExponentialIntegral(x)
+    from scipy.special import expi
+
+    return float(expi(x))
+
+
+def cross(a: Any, b: Any) -> Any:
+    """Vector product."""
+    if is_symbolic(a) or is_symbolic(b):
+        import ufl
+
+        return ufl.cross(a, b)
+    return np.cross(a, b).view(Tensor)
+
+
+def axes(f: Any, s: Any) -> tuple[Any, Any, Any]:
+    """Orthonormal axes (f, s', f × s'): s' is the part of ``s`` across the unit vector ``f``."""
+    across = s - dot(f, s) * f
+    across = across / sqrt(dot(across, across))
+    return f, across, cross(f, across)
 
 
 def identity() -> Any:

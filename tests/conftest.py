@@ -56,19 +56,19 @@ def compiled_units(request: pytest.FixtureRequest) -> None:
 def distorted() -> Callable:
     """distorted(element, cells=(1, 1, 1), curved=True, seed=0): a unit box, every node moved.
 
-    Corners by up to 0.12 of a cell, so no hexahedron is affine; at degree 2 every other node by up
-    to 0.02 more, so that edges and faces are curved, if ``curved``.
+    Corners by up to 0.12 of a cell, so no hexahedron or prism is affine; at degree 2 every other
+    node by up to 0.02 more, so that edges and faces are curved, if ``curved``.
     """
     from supple import Mesh
 
     def make(element: str, cells: tuple = (1, 1, 1), curved: bool = True, seed: int = 0) -> Mesh:
         rng = np.random.default_rng(seed)
-        mesh = Mesh.box(cells, (1.0, 1.0, 1.0), element[0] + "1")
+        mesh = Mesh.box(cells, (1.0, 1.0, 1.0), element.rstrip("12L") + "1")
         step = 1 / np.array(cells)
         mesh = mesh.moved(mesh.points + 0.12 * step * rng.uniform(-1, 1, mesh.points.shape))
-        if element[1] == "1":
+        if element == mesh.element:
             return mesh
-        mesh = mesh.elevated()
+        mesh = mesh.elevated(element)
         if not curved:
             return mesh
         return mesh.moved(mesh.points + 0.02 * step * rng.uniform(-1, 1, mesh.points.shape))

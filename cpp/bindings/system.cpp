@@ -58,8 +58,30 @@ void bind_terms(py::module_& module) {
       .def(py::init(
           [](const std::string& library, const supple::System& system, const CellArray& cells) {
             return std::make_shared<supple::KernelTerm>(supple::KernelLibrary::load(library),
-                                                        system.points(), connectivity(cells));
+                                                        system.points(), connectivity(cells),
+                                                        system.scalars());
           }))
+      .def_property_readonly(
+          "cells",
+          [](const supple::KernelTerm& term) { return supple::Connectivity(term.cells()); })
+      .def_property_readonly(
+          "nodes", [](const supple::KernelTerm& term) { return term.library().table().nodes; })
+      .def("set_scalar_unit", &supple::KernelTerm::set_scalar_unit)
+      .def_property_readonly("fields",
+                             [](const supple::KernelTerm& term) {
+                               const supple_library& table = term.library().table();
+                               std::vector<std::pair<std::string, int>> fields;
+                               for (int f = 0; f < table.field_count; ++f)
+                                 fields.emplace_back(table.fields[f].name, table.fields[f].size);
+                               return fields;
+                             })
+      .def_property_readonly(
+          "quadrature",
+          [](const supple::KernelTerm& term) {
+            const supple_library& table = term.library().table();
+            using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+            return Rows(Eigen::Map<const Rows>(table.points, table.point_count, table.dimension));
+          })
       .def("set_field", &supple::KernelTerm::set_field)
       .def("tabulate", &supple::KernelTerm::tabulate)
       .def_property_readonly("weights", [](const supple::KernelTerm& term) {
@@ -129,9 +151,11 @@ void bind_system(py::module_& module) {
       .def_readonly("solve", &supple::Timings::solve)
       .def_readonly("total", &supple::Timings::total);
   py::class_<System>(module, "System")
-      .def(py::init([](Vector points) {
-        return std::make_unique<System>(std::make_shared<const Vector>(std::move(points)));
+      .def(py::init([](Vector points, std::vector<supple::Index> home) {
+        return std::make_unique<System>(std::make_shared<const Vector>(std::move(points)),
+                                        std::move(home));
       }))
+      .def_property_readonly("scalars", &System::scalars)
       .def("add", &System::add)
       .def("set_free", &System::set_free)
       .def("energy", &System::energy)

@@ -25,16 +25,19 @@ struct KernelTerm::Buffers {
 };
 
 KernelTerm::KernelTerm(std::shared_ptr<const KernelLibrary> library,
-                       std::shared_ptr<const Vector> points, Connectivity cells)
+                       std::shared_ptr<const Vector> points, Connectivity cells, Index scalars)
     : library_(std::move(library)), points_(std::move(points)), cells_(std::move(cells)) {
   const supple_library& table = library_->table();
-  require_size("nodes per cell", cells_.cols(), table.nodes, "pass cells of the kernels' element");
+  nodes_ = table.nodes;
+  scalars_ = table.scalars;
+  require_size("nodes per cell", cells_.cols(), nodes_ + scalars_,
+               "pass cells of the kernels' element, and its scalars where it has some");
   const auto nodes = static_cast<Index>(points_->size() / 3);
+  scalar_offset_ = 2 * nodes;
   group_ = group_size(static_cast<Index>(cells_.rows()), table.lanes);
-  colouring_ = colour_cells(cells_, nodes, group_);
+  colouring_ = colour_cells(cells_, nodes + scalars, group_);
   fields_.resize(static_cast<std::size_t>(table.field_count));
   energy_ = library_->find("energy");
-  residual_ = &library_->require("residual");
   tangent_ = library_->find("tangent");
   volume_ratio_ = library_->find("volume_ratio");
 }
@@ -63,7 +66,7 @@ void KernelTerm::require_fields() const {
 void KernelTerm::call(const supple_kernel& kernel, Index first, const ConstVector& u,
                       Buffers& b) const {
   const supple_library& table = library_->table();
-  const std::ptrdiff_t lanes = table.lanes, m = table.nodes;
+  const std::ptrdiff_t lanes = table.lanes, m = nodes_, all = nodes_ + scalars_;
   std::fill(b.A.begin(), b.A.end(), 0.0);
   double* w = b.w.data();
   for (int f = 0; f < kernel.field_count; ++f) {
@@ -73,9 +76,11 @@ void KernelTerm::call(const supple_kernel& kernel, Index first, const ConstVecto
     for (std::ptrdiff_t lane = 0; lane < lanes; ++lane) {
       const std::ptrdiff_t cell = std::min<std::ptrdiff_t>(first + lane, cells_.rows() - 1);
       if (nodal) {
-        const Index* node = cells_.data() + cell * m;
-        for (std::ptrdiff_t i = 0; i < size; ++i)
+        const Index* node = cells_.data() + cell * all;
+        for (std::ptrdiff_t i = 0; i < 3 * m; ++i)
           w[i * lanes + lane] = u[3 * node[i / 3] + i % 3];
+        for (std::ptrdiff_t i = 3 * m; i < size; ++i)
+          w[i * lanes + lane] = scalar_unit_ * u[node[i - 2 * m] + scalar_offset_];
       } else {
         const double* value = fields_[number].data() + cell * size;
         for (std::ptrdiff_t i = 0; i < size; ++i)
@@ -87,7 +92,7 @@ void KernelTerm::call(const supple_kernel& kernel, Index first, const ConstVecto
   const double* points = points_->data();
   for (std::ptrdiff_t lane = 0; lane < lanes; ++lane) {
     const Index* node =
-        cells_.data() + std::min<std::ptrdiff_t>(first + lane, cells_.rows() - 1) * m;
+        cells_.data() + std::min<std::ptrdiff_t>(first + lane, cells_.rows() - 1) * all;
     for (std::ptrdiff_t i = 0; i < 3 * m; ++i) {
       b.x[static_cast<std::size_t>(i * lanes + lane)] = points[3 * node[i / 3] + i % 3];
     }
@@ -130,7 +135,7 @@ void KernelTerm::each(const supple_kernel& kernel, const ConstVector& u, Consume
 }
 
 double KernelTerm::energy(const ConstVector& u) const {
-  if (energy_ == nullptr) return constant().dot(u); // a load that does not depend on u
+  if (energy_ == nullptr) return constant().dot(u.head(points_->size())); // a load alike for all u
   std::vector<double> sums(colouring_.order.size(), 0.0);
   each(*energy_, u, [&](Index, Index count, const double* A, Index batch) {
     for (Index lane = 0; lane < count; ++lane)
@@ -153,19 +158,20 @@ const Vector& KernelTerm::constant() const {
 
 void KernelTerm::residual(const ConstVector& u, double scale, MutableVector r) const {
   if (tangent_ == nullptr) {
-    r += scale * constant();
+    r.head(points_->size()) += scale * constant();
   } else {
     add_residual(u, scale, r);
   }
 }
 
 void KernelTerm::add_residual(const ConstVector& u, double scale, MutableVector r) const {
-  const Index m = library_->table().nodes, lanes = library_->table().lanes;
-  each(*residual_, u, [&](Index first, Index count, const double* A, Index) {
+  const supple_kernel& kernel = library_->require("residual");
+  const Index lanes = library_->table().lanes, rows = kernel.rows;
+  each(kernel, u, [&](Index first, Index count, const double* A, Index) {
     for (Index lane = 0; lane < count; ++lane) {
-      const Index* node = cells_.data() + static_cast<std::ptrdiff_t>(first + lane) * m;
-      for (Index i = 0; i < 3 * m; ++i)
-        r[3 * node[i / 3] + i % 3] += scale * A[i * lanes + lane];
+      const Index* node = cells_.data() + static_cast<std::ptrdiff_t>(first + lane) * cells_.cols();
+      for (Index i = 0; i < rows; ++i)
+        r[dof(node, i)] += scale * unit(i) * A[i * lanes + lane];
     }
   });
 }
@@ -179,6 +185,14 @@ void KernelTerm::tangent(const ConstVector& u, double scale, const Scatter& map,
     if (scale != 1.0) {
       for (std::ptrdiff_t i = 0; i < entries * lanes; ++i)
         A[i] *= scale;
+    }
+    if (scalars_ > 0) {
+      for (std::ptrdiff_t i = 0; i < entries; ++i) {
+        const double both = unit(static_cast<Index>(i / tangent_->cols)) *
+                            unit(static_cast<Index>(i % tangent_->cols));
+        for (std::ptrdiff_t lane = 0; lane < lanes; ++lane)
+          A[i * lanes + lane] *= both;
+      }
     }
     for (Index lane = 0; lane < count; ++lane) {
       scatter_add(map, first + lane, A + lane, values.data(), lanes);

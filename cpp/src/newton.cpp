@@ -14,7 +14,8 @@ namespace {
 constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
-constexpr int kPatience = 4; // times more iterations where each is sure to lower the energy
+constexpr double kDoubtful = 1e8; // growth of LDLᵀ above which the signs of its pivots mean little
+constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
 
 /// How one load step is attacked: full Newton steps, or steps that must lower the energy.
 enum class Manner { Full, Guarded };
@@ -25,8 +26,8 @@ class Path {
   Path(System& system, const Vector& start, const Vector& prescribed,
        const NewtonSettings& settings, const Progress& progress)
       : system_(system), prescribed_(prescribed), settings_(settings), progress_(progress) {
-    require_size("start", start.size(), system.dofs(), "one row of three for each node");
-    require_size("prescribed", prescribed.size(), system.dofs(), "one row of three for each node");
+    require_size("start", start.size(), system.dofs(), "one entry for each dof");
+    require_size("prescribed", prescribed.size(), system.dofs(), "one entry for each dof");
     const Reduction& reduction = system_.reduction();
     is_free_ = Mask::Constant(system.dofs(), false);
     for (const Index dof : reduction.dof)
@@ -36,6 +37,7 @@ class Path {
     offset_ = Vector::Zero(system.dofs());
     if (settings_.warm) offset_ = system_.residual(start, 1.0);
     has_energy_ = system_.has_energy();
+    minimises_ = has_energy_ && system_.kind() == Kind::Cholesky;
   }
 
   NewtonResult run() {
@@ -163,7 +165,7 @@ class Path {
     double norm = first, best = std::numeric_limits<double>::infinity();
     record(s, 0, norm, tolerance(u, r, s), 0.0, 1.0);
     // Steps that lower an energy cannot run away: cutting the load instead would lose their ground.
-    const bool descends = manner == Manner::Guarded && has_energy_;
+    const bool descends = manner == Manner::Guarded && minimises_;
     const int limit = descends ? kPatience * settings_.max_iterations : settings_.max_iterations;
     for (int k = 1; k <= limit; ++k) {
       const Outcome factored = factorise(u, s, manner);
@@ -212,11 +214,21 @@ class Path {
   /// An equilibrium with an indefinite tangent is not where a body rests.
   Outcome stable(const Vector& u, double s) {
     if (!has_energy_) return Outcome::Converged;
+    if (!minimises_) return stable_saddle();
     if (shift_ == 0.0 && !indefinite_) return Outcome::Converged; // K was definite one step ago
     system_.assemble_tangent(u, loads(s));
     if (system_.factorise().ok()) return Outcome::Converged;
     result_.negative = system_.inertia().negative;
     return result_.negative > 0 ? Outcome::Unstable : Outcome::Converged;
+  }
+
+  /// Of a mixed form's tangent each scalar gives one negative eigenvalue, and a stable body no
+  /// more.
+  Outcome stable_saddle() {
+    const Inertia inertia = system_.inertia();
+    result_.negative = inertia.negative - system_.scalars();
+    const bool doubtful = inertia.growth > kDoubtful;
+    return result_.negative == 0 || doubtful ? Outcome::Converged : Outcome::Unstable;
   }
 
   Outcome fault() const {
@@ -227,13 +239,13 @@ class Path {
   double line_search(const Vector& u, const Vector& d, const Vector& r, double norm, double s,
                      Manner manner, bool moves_supports) {
     const bool only_guard = manner == Manner::Full || moves_supports;
-    const double before = has_energy_ && !only_guard ? energy(u, s) : 0.0;
+    const double before = minimises_ && !only_guard ? energy(u, s) : 0.0;
     const double slope = r.dot(d), rounding = 1e-12 * std::abs(before);
     for (double a = 1.0; a >= kShortest; a *= 0.5) {
       const Vector trial = u + a * d;
       if (!admissible(trial, s)) continue;
       if (only_guard) return a;
-      if (has_energy_) {
+      if (minimises_) {
         if (energy(trial, s) <= before + kArmijo * a * slope + rounding) return a;
       } else if (free_norm(residual(trial, s)) <= (1.0 - kArmijo * a) * norm) {
         return a;
@@ -255,6 +267,7 @@ class Path {
   Mask is_free_;
   Vector start_fixed_, offset_;
   bool has_energy_ = false;
+  bool minimises_ = false; // an equilibrium is a minimum of the energy, not a saddle
   double shift_ = 0.0;
   bool indefinite_ = false;
   NewtonResult result_;

@@ -58,7 +58,7 @@ void fill_full(const BlockPattern& pattern, Reduction& reduction) {
 } // namespace
 
 Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage) {
-  require_size("free", free.size(), pattern.dofs(), "give one entry for each dof, three a node");
+  require_size("free", free.size(), pattern.dofs(), "give one entry for each dof");
   Reduction reduction;
   reduction.unknown = number_free(free, reduction.dof);
   reduction.full_nonzeros = pattern.nonzeros();
@@ -66,8 +66,10 @@ Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage)
   csc.size = reduction.free();
   csc.lower = storage == Storage::Lower;
   csc.start.assign(static_cast<std::size_t>(csc.size) + 1, 0);
-  for (Index dof : reduction.dof)
-    csc.group.push_back(dof / 3);
+  for (Index dof : reduction.dof) { // a scalar is eliminated together with its home
+    const Index scalar = dof - 3 * pattern.nodes;
+    csc.group.push_back(scalar < 0 ? dof / 3 : pattern.home[static_cast<std::size_t>(scalar)]);
+  }
   csc.lower ? fill_lower(pattern, reduction) : fill_full(pattern, reduction);
   return reduction;
 }
@@ -81,7 +83,7 @@ void Reduction::gather(const ConstVector& values, MutableVector reduced) const {
 
 Vector Reduction::restrict(const ConstVector& full) const {
   require_size("full", full.size(), static_cast<long long>(unknown.size()),
-               "give three entries a node");
+               "give one entry for each dof");
   Vector reduced(free());
   for (Index k = 0; k < free(); ++k)
     reduced[k] = full[dof[static_cast<std::size_t>(k)]];
@@ -91,7 +93,7 @@ Vector Reduction::restrict(const ConstVector& full) const {
 void Reduction::add_to(const ConstVector& reduced, double scale, MutableVector full) const {
   require_size("reduced", reduced.size(), free(), "give one entry for each free dof");
   require_size("full", full.size(), static_cast<long long>(unknown.size()),
-               "give three entries a node");
+               "give one entry for each dof");
   for (Index k = 0; k < free(); ++k)
     full[dof[static_cast<std::size_t>(k)]] += scale * reduced[k];
 }

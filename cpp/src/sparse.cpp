@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "node_cells.hpp"
 #include "supple/error.hpp"
@@ -27,10 +28,11 @@ CellNodes cell_nodes(const std::vector<Connectivity>& connectivities) {
 }
 
 void find_neighbours(BlockPattern& pattern, const NodeCells& around, const CellNodes& cells) {
-  std::vector<Index> seen(static_cast<std::size_t>(pattern.nodes), -1);
+  const Index all = pattern.nodes + pattern.scalars();
+  std::vector<Index> seen(static_cast<std::size_t>(all), -1);
   pattern.node_start.assign(1, 0);
   const auto most = static_cast<std::size_t>(std::numeric_limits<Index>::max()) / 9;
-  for (Index n = 0; n < pattern.nodes; ++n) {
+  for (Index n = 0; n < all; ++n) {
     const auto node = static_cast<std::size_t>(n);
     const std::size_t begin = pattern.neighbour.size();
     pattern.neighbour.push_back(n);
@@ -58,21 +60,36 @@ void expand_to_dofs(BlockPattern& pattern) {
   pattern.row_start.assign(1, 0);
   pattern.row_start.reserve(static_cast<std::size_t>(pattern.dofs()) + 1);
   pattern.column.reserve(9 * pattern.neighbour.size());
-  for (Index n = 0; n < pattern.nodes; ++n) {
+  const auto width = [&](Index a) { return a < pattern.nodes ? 3 : 1; };
+  for (Index n = 0; n < pattern.nodes + pattern.scalars(); ++n) {
     const auto node = static_cast<std::size_t>(n);
-    for (int i = 0; i < 3; ++i) {
-      for (Index k = pattern.node_start[node]; k < pattern.node_start[node + 1]; ++k)
-        for (Index j = 0; j < 3; ++j)
-          pattern.column.push_back(3 * pattern.neighbour[static_cast<std::size_t>(k)] + j);
+    for (int i = 0; i < width(n); ++i) {
+      for (Index k = pattern.node_start[node]; k < pattern.node_start[node + 1]; ++k) {
+        const Index other = pattern.neighbour[static_cast<std::size_t>(k)];
+        for (Index j = 0; j < width(other); ++j)
+          pattern.column.push_back(pattern.first_dof(other) + j);
+      }
       pattern.row_start.push_back(static_cast<Index>(pattern.column.size()));
     }
   }
 }
 
+/// How many columns at the end are scalars, in every row alike.
+Index scalars_of(const Connectivity& cells, Index nodes) {
+  if (cells.rows() == 0) return 0;
+  const auto count = static_cast<Index>((cells.row(0).array() >= nodes).count());
+  const Eigen::Index m = cells.cols() - count;
+  if ((cells.leftCols(m).array() >= nodes).any() || (cells.rightCols(count).array() < nodes).any())
+    throw ShapeError("cells must name their nodes first and their scalars last, got a row that "
+                     "mixes them; number the scalars from the number of nodes on");
+  return count;
+}
+
 Scatter scatter_map(const BlockPattern& pattern, const Connectivity& cells) {
   Scatter map;
   map.cells = static_cast<Index>(cells.rows());
-  map.nodes_per_cell = static_cast<Index>(cells.cols());
+  map.scalars_per_cell = scalars_of(cells, pattern.nodes);
+  map.nodes_per_cell = static_cast<Index>(cells.cols()) - map.scalars_per_cell;
   const auto m = static_cast<std::size_t>(cells.cols());
   map.position.resize(static_cast<std::size_t>(cells.rows()) * m * m);
   map.row_stride.resize(static_cast<std::size_t>(cells.rows()) * m);
@@ -91,8 +108,8 @@ Scatter scatter_map(const BlockPattern& pattern, const Connectivity& cells) {
 } // namespace
 
 Index BlockPattern::row_stride(Index a) const {
-  const auto node = static_cast<std::size_t>(a);
-  return 3 * (node_start[node + 1] - node_start[node]);
+  const auto row = static_cast<std::size_t>(first_dof(a));
+  return row_start[row + 1] - row_start[row];
 }
 
 Index BlockPattern::position(Index a, Index b) const {
@@ -101,16 +118,21 @@ Index BlockPattern::position(Index a, Index b) const {
   const auto last = neighbour.begin() + node_start[node + 1];
   const auto found = std::lower_bound(first, last, b);
   if (found == last || *found != b) return -1;
-  return row_start[3 * node] + 3 * static_cast<Index>(found - first);
+  const auto with_three = static_cast<Index>(std::lower_bound(first, found, nodes) - first);
+  const auto before = static_cast<Index>(found - first);
+  return row_start[static_cast<std::size_t>(first_dof(a))] + before + 2 * with_three;
 }
 
-BlockPattern block_pattern(Index nodes, const std::vector<Connectivity>& connectivities) {
+BlockPattern block_pattern(Index nodes, const std::vector<Connectivity>& connectivities,
+                           std::vector<Index> home) {
   if (nodes < 0)
     throw ShapeError("nodes must be 0 or more, got " + std::to_string(nodes) +
                      "; give the number of points of the mesh");
   BlockPattern pattern;
   pattern.nodes = nodes;
-  find_neighbours(pattern, node_cells(nodes, connectivities), cell_nodes(connectivities));
+  pattern.home = std::move(home);
+  const Index all = nodes + pattern.scalars();
+  find_neighbours(pattern, node_cells(all, connectivities), cell_nodes(connectivities));
   expand_to_dofs(pattern);
   for (const Connectivity& cells : connectivities)
     pattern.scatter.push_back(scatter_map(pattern, cells));
@@ -120,8 +142,8 @@ BlockPattern block_pattern(Index nodes, const std::vector<Connectivity>& connect
 void multiply(const BlockPattern& pattern, const ConstVector& values, const ConstVector& x,
               MutableVector y) {
   require_size("values", values.size(), pattern.nonzeros(), "assemble them on this pattern");
-  require_size("x", x.size(), pattern.dofs(), "give three entries a node");
-  require_size("y", y.size(), pattern.dofs(), "give three entries a node");
+  require_size("x", x.size(), pattern.dofs(), "give one entry for each dof");
+  require_size("y", y.size(), pattern.dofs(), "give one entry for each dof");
 #pragma omp parallel for schedule(static) if (pattern.nonzeros() > 1000000)
   for (Index r = 0; r < pattern.dofs(); ++r) {
     double sum = 0.0;

@@ -57,7 +57,7 @@ Kind System::kind() const {
   for (const auto& term : terms_) {
     if (!term->symmetric()) return Kind::Unsymmetric;
   }
-  return Kind::Cholesky;
+  return scalars() > 0 ? Kind::QuasiDefinite : Kind::Cholesky;
 }
 
 double System::energy(const ConstVector& u, double load_factor) const {
@@ -97,7 +97,8 @@ const BlockPattern& System::pattern() {
     cells.reserve(terms_.size());
     for (const auto& term : terms_)
       cells.push_back(term->cells());
-    pattern_ = std::make_unique<BlockPattern>(block_pattern(dofs() / 3, cells));
+    pattern_ = std::make_unique<BlockPattern>(
+        block_pattern(static_cast<Index>(points_->size() / 3), cells, home_));
   }
   return *pattern_;
 }
@@ -177,6 +178,7 @@ Vector System::apply(const ConstVector& x) {
 }
 
 Inertia System::inertia() {
+  if (kind() == Kind::QuasiDefinite && factor_) return factor_->inertia();
   if (!factorise_indefinite().ok()) return {0, 1, 0, 0.0};
   return indefinite_->inertia();
 }

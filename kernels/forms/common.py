@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import ufl
 
 from ..elements import Space, quadrature
+
+
+@dataclass(frozen=True)
+class Composite:
+    """A kernel written in C around calls of parts.
+
+    Attributes:
+        rows, cols: of A.
+        body: statements on A, w, x; ``call_<part>(A, w, inner, x)`` adds a part, all arrays are
+            [entry][LANES].
+    """
+
+    rows: int
+    cols: int
+    body: str
 
 
 @dataclass(frozen=True)
@@ -19,21 +34,28 @@ class Forms:
         fields: coefficient name → UFL coefficient; "u" (node values) and per-cell fields.
         kernels: kernel name → UFL form, or for point values (expression, points).
         degree: of the quadrature.
+        scalars: scalar unknowns behind the nodes' own (pressures).
+        inner: fields that composites give to their parts; nobody sets them from outside.
+        parts: like `kernels`, called by composites only.
+        composites: kernel name → what is made of parts in C.
     """
 
     space: Space
     fields: dict[str, Any]
     kernels: dict[str, Any]
     degree: int
+    scalars: int = 0
+    inner: dict[str, Any] = field(default_factory=dict)
+    parts: dict[str, Any] = field(default_factory=dict)
+    composites: dict[str, Composite] = field(default_factory=dict)
 
 
 def measure(space: Space, degree: int) -> Any:
-    """dx on the term's own mesh with the pinned rule."""
-    return ufl.Measure(
-        "dx",
-        domain=space.mesh,
-        metadata={"quadrature_degree": degree, "quadrature_rule": "default"},
-    )
+    """dx on the term's own mesh with the very points of `at_points`."""
+    points, weights = quadrature(space.name, degree)
+    rule = {"quadrature_rule": "custom", "quadrature_degree": int(degree),
+            "quadrature_points": points, "quadrature_weights": weights}  # fmt: skip
+    return ufl.Measure("dx", domain=space.mesh, metadata=rule)
 
 
 def volume_scale(space: Space) -> Any:

@@ -11,37 +11,17 @@ a residual 1e-3 of the unrelaxed energy keeps slack skin from being without stif
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import ufl
 
 from ..elements import space as make_space
-from ..kinematics import Kinematics
+from ..membrane_kinematics import SurfaceKinematics
 from ..reader import EnergyFileError, Law
 from .common import Forms, at_points, measure
 
 #: Share of the unrelaxed energy that remains in compression.
 RESIDUAL = 1e-3
-
-
-class SurfaceKinematics(Kinematics):
-    """Kinematics of a volume-preserving membrane from its in-plane tensor (2, 2)."""
-
-    def __init__(self, in_plane: Any) -> None:
-        self._in_plane = in_plane
-        normal = 1 / ufl.det(in_plane)
-        rows = [[in_plane[0, 0], in_plane[0, 1], 0], [in_plane[1, 0], in_plane[1, 1], 0]]
-        super().__init__(C=ufl.as_matrix([*rows, [0, 0, normal]]), J=ufl.as_ufl(1.0))
-
-    @cached_property
-    def trace_U(self) -> Any:
-        area = ufl.sqrt(ufl.det(self._in_plane))
-        return ufl.sqrt(ufl.tr(self._in_plane) + 2 * area) + 1 / area
-
-    @cached_property
-    def qr_strain(self) -> Any:
-        raise EnergyFileError("a law of the QR strain cannot make a skin; use corotational_polar.")
 
 
 def direct(law: Law, facet: str, degree: int) -> Forms:

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from .errors import ConvergenceError, InputError, MaterialError, MeshError, SuppleError
 
 if TYPE_CHECKING:
+    from .author.curves import curves as curves
+    from .author.fit import fit as fit
     from .body import Body as Body
     from .body import assemble as assemble
     from .laws import Material as Material
@@ -33,8 +35,11 @@ _HOME = {
     "Surface": "surface",
     "Tag": "mesh",
     "assemble": "body",
+    "curves": "author.curves",
+    "fit": "author.fit",
     "material": "laws",
     "materials": "laws",
+    "sensitivity": "sensitivity",
 }
 
 __all__ = [

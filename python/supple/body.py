@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import newton, parameters, supports, terms
-from .errors import InputError
+from .errors import InputError, MaterialError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
@@ -20,13 +20,12 @@ from .state import Rest, State, outcome
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
+    from .kernels.law import Law
     from .mesh import Mesh
     from .surface import Surface
 
 Floats = npt.NDArray[np.float64]
 
-#: Formulations of the volume terms.
-FORMULATIONS = ("displacement",)
 METHODS = ("inverse", "reversed-gravity")
 
 
@@ -36,9 +35,12 @@ class Body:
     Args:
         mesh: points in m.
         material: name of a shipped energy, or path of an energy file.
-        formulation: "displacement".
+        formulation: "displacement"; "mixed" (continuous pressure; P2, Q2L) or "mean-dilatation"
+            (one volume ratio a cell; Q1), free of locking, for laws with psi_dev and psi_vol.
         density: kg/m³, of the rest state; one number or one a cell.
-        quadrature: degree of the stiffness' rule; None for the element's own (DESIGN §4).
+        quadrature: degree of the stiffness' rule, or (degree, scheme) with a scheme "default",
+            "gauss_jacobi", "gll" (hexahedra) or "xiao_gimbutas" (tetrahedra; prisms, whose rules
+            are a triangle's times Gauss'); None for the element's own (DESIGN §4).
         **values: the law's parameters in SI, each one number or one a cell.
 
     Raises:
@@ -52,14 +54,12 @@ class Body:
         material: str | Path,
         formulation: str = "displacement",
         density: npt.ArrayLike = 0.0,
-        quadrature: int | None = None,
+        quadrature: int | tuple[int, str] | None = None,
         **values: Any,
     ) -> None:
-        if formulation not in FORMULATIONS:
-            raise InputError(f"formulation must be one of {FORMULATIONS}, got {formulation!r}.")
-        if quadrature is not None and not 1 <= quadrature <= 20:
-            raise InputError(f"quadrature must be a degree from 1 to 20, got {quadrature}.")
         law, count = read_law(material), len(mesh.cells)
+        _require_offered(formulation, mesh.element)
+        _require_split(law, formulation)
         region = terms.Region(law, np.arange(count), parameters.defaults(law, count))
         region.values |= parameters.given(law, values, count)
         rho = parameters.per_cell("density", density, count)
@@ -67,7 +67,13 @@ class Body:
             raise InputError(f"density must be at least 0 kg/m³, got {rho.min():g}.")
         n = len(mesh.points)
         self._description = terms.Description(
-            mesh, [region], rho, np.zeros(3), np.zeros((n, 3)), quadrature
+            mesh,
+            [region],
+            rho,
+            np.zeros(3),
+            np.zeros((n, 3)),
+            _degree(mesh, quadrature),
+            formulation,
         )
         self._fixed = np.zeros((n, 3), dtype=bool)
         self._prescribed = np.zeros((n, 3))
@@ -83,6 +89,7 @@ class Body:
     def region(self, cells: CellWhere, material: str | Path, **values: Any) -> Body:
         """Another law on some cells: a mask, ids or a tag. Values as in the constructor."""
         d, law = self._description, read_law(material)
+        _require_split(law, d.formulation)
         ids = self.mesh.cell_ids(cells)
         new = terms.Region(law, ids, parameters.defaults(law, len(ids)))
         new.values |= parameters.given(law, values, len(ids))
@@ -178,9 +185,10 @@ class Body:
     # Loads
 
     def force(self, where: Where, force: npt.ArrayLike) -> Body:
-        """Add ``force`` (3,) N on each node of ``where``."""
-        forces = self._description.forces.copy()
-        forces[self.mesh.nodes(where)] += _vector("force", force)
+        """Add ``force``, N, on the nodes of ``where``: (3,) on each, or one row a node."""
+        forces, nodes = self._description.forces.copy(), self.mesh.nodes(where)
+        rows = np.ndim(force) == 2
+        forces[nodes] += _rows("force", force, len(nodes)) if rows else _vector("force", force)
         self._description.forces = forces
         return self
 
@@ -243,11 +251,12 @@ class Body:
         if solver not in ("auto", "direct"):
             raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
-        u0 = np.zeros_like(self._prescribed) if start is None else self._start(start)
-        result, built = self._run(settings, u0, warm=start is not None)
+        result, built = self._run(settings, None if start is None else self._start(start))
         newton.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
-        return State(**outcome(result, built, self._fixed), _solved=solved, _form="direct")
+        return State(
+            **outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct"
+        )
 
     def rest_shape(
         self,
@@ -277,13 +286,12 @@ class Body:
             raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         if method == "inverse":
-            zero = np.zeros_like(self._prescribed)
-            result, built = self._run(settings, zero, inverse=True, density_of=density_of)
+            result, built = self._run(settings, inverse=True, density_of=density_of)
         else:
-            result, built = self._reversed()._run(settings, np.zeros_like(self._prescribed))
+            result, built = self._reversed()._run(settings)
         newton.require_converged(result, built, self._description, inverse=True)
         solved = terms.snapshot(self._description)
-        fields = outcome(result, built, self._fixed)
+        fields = outcome(result, built, self._description, self._fixed)
         rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
         newton.require_usable(rest)
         return rest
@@ -320,21 +328,25 @@ class Body:
     def _run(
         self,
         settings: Settings,
-        start: Floats,
-        warm: bool = False,
+        start: Floats | None = None,
         inverse: bool = False,
         density_of: str = "rest",
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
-        native.warm = warm
+        native.warm = start is not None
         supports.require_held(self.mesh, self._fixed, self._normals())
         built = self._system(inverse, density_of)
         laws = {r.law.name: r.law for r in self._description.regions if len(r.ids)}
         barriers = [law for law in laws.values() if "barrier" in law.exceptions]
         native.refuse_inversion = inverse or len(barriers) < len(laws)
-        built.system.set_free(~self._fixed.ravel())
+        scalars = np.zeros(built.system.scalars)
+        built.system.set_free(np.append(~self._fixed.ravel(), scalars == 0))
         built.system.reset_timings()
-        target = -self._prescribed if inverse else self._prescribed
+        target = np.append(-self._prescribed if inverse else self._prescribed, scalars)
+        if start is None:
+            start = np.zeros_like(target)
+        else:
+            start[self._prescribed.size :] /= built.scalar_unit
         return newton.solve(built.system, start, target, native, settings), built
 
     def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
@@ -350,13 +362,7 @@ class Body:
 
     def _rounding(self) -> float:
         """Size of the rounding errors in the internal forces, N: moduli × area, springs × place."""
-        moduli = [
-            float(region.values[p.name].max())
-            for region in self._description.regions
-            for p in region.law.parameters
-            if p.kind.unit == "Pa" and len(region.ids)
-        ]
-        total = 1e-14 * max(moduli, default=1.0) * self.mesh.size**2
+        total = 1e-14 * terms.modulus(self._description) * self.mesh.size**2
         for slide in self._description.slides:
             place = max(np.abs(self.mesh.points).max(), np.abs(slide.surface.points).max())
             total += 2e-15 * float(np.linalg.norm(slide.stiffness)) * float(place)
@@ -375,29 +381,90 @@ class Body:
                 f"start must be a state of this mesh with {len(self.mesh.points)} nodes, "
                 f"got one with {len(start.u)}."
             )
-        return start.u
+        return unknowns(self, start.u, start.pressure)
 
 
-def assemble(body: Body, u: npt.ArrayLike) -> tuple[float, Floats, csr_array]:
+def unknowns(body: Body, u: npt.ArrayLike, pressure: npt.ArrayLike | None = None) -> Floats:
+    """``u`` (n, 3) m, node-major, then in a mixed formulation ``pressure`` (n,) Pa at the corners.
+
+    Raises:
+        InputError: another shape, or a pressure where there is none.
+    """
+    moved, nodes = np.asarray(u, dtype=float), terms.pressure_nodes(body._description)
+    if moved.shape != body.mesh.points.shape:
+        raise InputError(f"u must have shape {body.mesh.points.shape}, got {moved.shape}.")
+    if pressure is None:
+        return np.append(moved, np.zeros(len(nodes)))
+    p = np.asarray(pressure, dtype=float)
+    if not len(nodes) or p.shape != (len(moved),):
+        raise InputError(
+            f"pressure must have shape ({len(moved)},) and a mixed formulation, got {p.shape} "
+            f"and {body._description.formulation!r}."
+        )
+    return np.append(moved, p[nodes])
+
+
+def assemble(
+    body: Body, u: npt.ArrayLike, pressure: npt.ArrayLike | None = None
+) -> tuple[float, Floats, csr_array]:
     """Energy, residual and tangent of a body at ``u`` (n, 3) m, all dofs, before elimination.
+
+    Args:
+        pressure: (n,) Pa, of a mixed formulation, which reads it at the corners; else None.
 
     Returns:
         energy (J; NaN where a load has none), residual (n, 3) N, internal minus external, and
-        tangent (3n, 3n) N/m as csr; dofs are node-major: x, y, z of node 0 first.
+        tangent (3n, 3n) N/m as csr; dofs are node-major: x, y, z of node 0 first. In a mixed
+        formulation the residual is flat, (3n + c,), its last c entries (m³) and the tangent's last
+        c rows and columns those of the corners' pressures in the order of their nodes.
 
     Raises:
-        InputError: ``u`` has another shape.
+        InputError: ``u`` or ``pressure`` has another shape.
     """
-    from scipy.sparse import csr_array
+    from scipy.sparse import csr_array, diags_array
 
-    flat = np.asarray(u, dtype=float)
-    if flat.shape != body.mesh.points.shape:
-        raise InputError(f"u must have shape {body.mesh.points.shape}, got {flat.shape}.")
-    flat = flat.ravel()
-    system = body._system().system
+    flat, built = unknowns(body, u, pressure), body._system()
+    system, n = built.system, body.mesh.points.size
+    flat[n:] /= built.scalar_unit
     energy = system.energy(flat, 1.0) if system.has_energy() else float("nan")
+    residual = system.residual(flat, 1.0)
     tangent = csr_array(system.tangent(flat), shape=(flat.size, flat.size))
-    return energy, system.residual(flat, 1.0).reshape(-1, 3), tangent
+    if flat.size == n:
+        return energy, residual.reshape(-1, 3), tangent
+    unit = np.append(np.ones(n), np.full(flat.size - n, 1 / built.scalar_unit))
+    return energy, unit * residual, csr_array(diags_array(unit) @ tangent @ diags_array(unit))
+
+
+def _require_offered(formulation: str, element: str) -> None:
+    from .kernels.unit import OFFERED
+
+    if formulation not in OFFERED:
+        raise InputError(f"formulation must be one of {tuple(OFFERED)}, got {formulation!r}.")
+    if element not in OFFERED[formulation]:
+        raise InputError(
+            f"formulation {formulation!r} wants a mesh of {' or '.join(OFFERED[formulation])}, "
+            f"got {element}; use Mesh.elevated() or another formulation."
+        )
+
+
+def _require_split(law: Law, formulation: str) -> None:
+    if formulation != "displacement" and not law.is_split:
+        raise MaterialError(
+            f"formulation {formulation!r} needs a law with psi_dev and psi_vol, and {law.name} "
+            'gives psi as a whole; use formulation "displacement" or another law.'
+        )
+
+
+def _degree(mesh: Mesh, quadrature: int | tuple[int, str] | None) -> int | None:
+    """The rule that was asked for, checked before anything is compiled."""
+    from .kernels.degree import checked
+
+    if quadrature is None:
+        return None
+    try:
+        return checked(quadrature, mesh.table.cell.name)
+    except ValueError as problem:
+        raise InputError(str(problem)) from None
 
 
 def _vector(name: str, value: npt.ArrayLike) -> Floats:
@@ -405,3 +472,10 @@ def _vector(name: str, value: npt.ArrayLike) -> Floats:
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InputError(f"{name} must be three numbers, got {value!r}.")
     return vector
+
+
+def _rows(name: str, value: npt.ArrayLike, count: int) -> Floats:
+    rows = np.asarray(value, dtype=float)
+    if rows.shape != (count, 3) or not np.isfinite(rows).all():
+        raise InputError(f"{name} must be finite with shape ({count}, 3), got {rows.shape}.")
+    return rows

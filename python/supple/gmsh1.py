@@ -14,8 +14,12 @@ import numpy.typing as npt
 from supple.errors import MeshError
 
 #: Gmsh's number -> meshio's type, for cells that both number alike.
-_TYPES = {1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 15: "vertex"}
-_NODES = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "vertex": 1}
+_TYPES = {
+    1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 6: "wedge", 15: "vertex"
+}  # fmt: skip
+_NODES = {
+    "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "vertex": 1
+}  # fmt: skip
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -97,5 +101,5 @@ def _bad(path: Path, row: str) -> str:
     """The message for a row of $ELM that cannot be used."""
     return (
         f"{path}: the element line {row[:60]!r} is cut short, names an unknown node or a type "
-        "other than vertex, line, triangle, quad, tetrahedron, hexahedron; save it as Gmsh 2."
+        "other than vertex, line, triangle, quad, tetrahedron, hexahedron, prism; save as Gmsh 2."
     )

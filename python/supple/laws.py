@@ -38,15 +38,32 @@ def material(name_or_path: str | Path) -> Material:
     """The energy of that name, or of that file (anything that ends in .py).
 
     Raises:
-        MaterialError: no such energy (the nearest is named), or a wrong file (line and remedy).
+        MaterialError: no such energy (the nearest is named), or a wrong file (line and remedy): not
+            readable, not scalar, not objective, not free of energy and stress at rest.
     """
     law = read_law(name_or_path)
+    if Path(name_or_path).suffix == ".py":  # those that ship are held to it by tests
+        _require_sound(law)
+    return _of(law)
+
+
+def _of(law: Law) -> Material:
     return Material(law.name, law.parameters, law.reference, law.exceptions, law.path)
+
+
+def _require_sound(law: Law) -> None:
+    from .kernels import checks, reader
+
+    try:
+        checks.require_sound(law)
+    except reader.EnergyFileError as problem:
+        raise MaterialError(str(problem)) from None
 
 
 def materials() -> list[Material]:
     """All shipped energies, by name."""
-    return [material(path) for path in sorted(folder().glob("*.py")) if path.stem != "__init__"]
+    names = sorted(path.stem for path in folder().glob("*.py"))
+    return [_of(read_law(name)) for name in names if name != "__init__"]
 
 
 def read_law(name_or_path: str | Path) -> Law:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from supple import mesh_box, mesh_checks, mesh_jacobian, mesh_topology
 from supple.errors import InputError, MeshError
-from supple.kernels.cells import FACETS, Element
+from supple.kernels.cells import NO_NODE, Element
 from supple.mesh_tags import CellWhere, Tag, Where, chosen, find_tag
 
 Floats = npt.NDArray[np.float64]
@@ -28,7 +28,8 @@ class Mesh:
     Attributes:
         points: (n, 3) m.
         cells: (c, nodes per cell) node ids in VTK order.
-        element: "P1", "P2" (tetrahedra), "Q1" or "Q2" (hexahedra, 8 or 20 nodes).
+        element: "P1", "P2" (tetrahedra), "Q1", "Q2", "Q2L" (hexahedra of 8, 20, 27 nodes), "Pr1"
+            or "Pr2" (prisms of 6 or 18 nodes).
         tags: name -> Tag.
 
     Raises:
@@ -69,7 +70,8 @@ class Mesh:
     ) -> Mesh:
         """A box from ``origin`` to ``origin + size`` (3,) m, cut into ``cells`` (3,) blocks.
 
-        Tetrahedra: six a block around its 000–111 diagonal. Nodes run fastest along x.
+        Tetrahedra: six a block around its 000–111 diagonal; prisms: two along z on either side of
+        the 000–110 one. Nodes run fastest along x.
         """
         table = mesh_checks.checked_element(element)
         counts, lengths, corner = np.array(cells), np.array(size, float), np.array(origin, float)
@@ -80,9 +82,9 @@ class Mesh:
         if corner.shape != (3,):
             raise MeshError(f"origin must be three coordinates in m, got {origin}.")
         nx, ny, nz = counts.tolist()
-        parts = mesh_box.box((nx, ny, nz), lengths, corner, table.cell.is_simplex)
-        mesh = cls(*parts, element[0] + "1")
-        return mesh if table.degree == 1 else mesh.elevated()
+        parts = mesh_box.box((nx, ny, nz), lengths, corner, table.cell.name)
+        mesh = cls(*parts, mesh_topology.of_degree(1, table))
+        return mesh if table.degree == 1 else mesh.elevated(element)
 
     @classmethod
     def read(cls, path: str | Path, unit: str | None = None, element: str | None = None) -> Mesh:
@@ -138,7 +140,7 @@ class Mesh:
         return float(np.ptp(self.points, axis=0).max())
 
     def quality(self) -> Floats:
-        """Mean ratio (c,) of each cell: 1 regular tetrahedron or cube, 0 flat."""
+        """Mean ratio (c,) of each cell: 1 regular tetrahedron, cube or prism, 0 flat."""
         return mesh_jacobian.mean_ratio(self.points, self.cells, self.table)
 
     def nodes(self, where: Where) -> Ints:
@@ -151,7 +153,7 @@ class Mesh:
         if isinstance(where, str):
             tag = find_tag(self.tags, where)
             ids = self.cells[tag.ids] if tag.kind == "cells" else tag.ids
-            return chosen(ids.ravel(), len(self.points), f"nodes of tag {where!r}")
+            return chosen(ids[ids != NO_NODE], len(self.points), f"nodes of tag {where!r}")
         if callable(where):
             mask = np.asarray(where(self.points))
             if mask.dtype != np.bool_:
@@ -173,17 +175,19 @@ class Mesh:
     def boundary(self, where: Where | None = None) -> Ints:
         """Outward boundary facets (f, nodes per facet), VTK order, all of whose nodes are chosen.
 
-        A tag of facets chooses exactly those of its facets that lie on the boundary.
+        A tag of facets chooses exactly those of its facets that lie on the boundary. Of prisms,
+        the triangles' rows end in -1, so that they are as long as the quadrilaterals'.
         """
         if where is None:
             return self._outside
         if isinstance(where, str) and find_tag(self.tags, where).kind == "facets":
-            corners = FACETS[self.table.facet].corners
-            tagged = self.tags[where].ids[:, :corners]
-            known, own = mesh_topology.corner_groups(self._outside[:, :corners], tagged)
+            rows = (self._outside, self.tags[where].ids)
+            corners = [mesh_topology.facet_corners(facets, self.table) for facets in rows]
+            known, own = mesh_topology.corner_groups(*corners)
             mask: npt.NDArray[np.bool_] = np.isin(known, own)
         else:
-            mask = np.all(np.isin(self._outside, self.nodes(where)), axis=1)
+            nodes = np.append(self.nodes(where), NO_NODE)
+            mask = np.all(np.isin(self._outside, nodes), axis=1)
         if not mask.any():
             raise InputError("no boundary facet has all of its nodes in `where`; choose more.")
         return self._outside[mask]
@@ -204,23 +208,28 @@ class Mesh:
         mesh._set(**{**self.__dict__, "points": new})
         return mesh
 
-    def elevated(self) -> Mesh:
-        """The mesh of degree 2 (P1 → P2, Q1 → Q2) with nodes at the middles of the edges.
+    def elevated(self, element: str | None = None) -> Mesh:
+        """The mesh of degree 2 with nodes at the middles of edges (and of faces and cells).
 
-        Point tags take in the middle of each edge both of whose ends they hold.
+        P1 → P2, Pr1 → Pr2, and Q1 → Q2 or, if ``element`` says so, Q2L. Point tags take in a new
+        node where they hold all corners that it is the middle of.
         """
-        if self.table.degree != 1:
-            raise MeshError(f"only P1 and Q1 meshes can be elevated, got {self.element}.")
-        points, cells, higher, edges = mesh_topology.elevate(self.points, self.cells, self.table)
+        table = self.table
+        higher = mesh_checks.checked_element(element or mesh_topology.of_degree(2, table))
+        if table.degree != 1 or higher.degree != 2 or higher.cell is not table.cell:
+            raise MeshError(
+                f"only P1, Q1 and Pr1 meshes can be elevated, to P2, Q2 or Q2L and Pr2; "
+                f"got {self.element} to {higher.name}."
+            )
+        points, cells, parents = mesh_topology.elevate(self.points, self.cells, table, higher)
         tags = {}
         for name, tag in self.tags.items():
             ids = tag.ids
             if tag.kind == "facets":
-                facet = FACETS[self.table.facet]
-                ids = mesh_topology.elevate_facets(ids, facet, edges, len(self.points))
+                ids = mesh_topology.elevate_facets(ids, self.cells, table, cells, higher)
             elif tag.kind == "points":
-                both = np.flatnonzero(np.isin(edges, ids).all(axis=1))
-                ids = np.concatenate([ids, len(self.points) + both])
+                held = np.concatenate([np.isin(corners, ids).all(axis=1) for corners in parents])
+                ids = np.concatenate([ids, len(self.points) + np.flatnonzero(held)])
             tags[name] = Tag(tag.kind, ids)
         return Mesh(points, cells, higher.name, tags)
 

@@ -11,17 +11,23 @@ Ints = npt.NDArray[np.int64]
 #: Corners of the unit cube by number: bit 0 is x, bit 1 is y, bit 2 is z.
 #: Six tetrahedra around the 000–111 diagonal, each positive.
 _TETRAHEDRA = [(0, 1, 3, 7), (0, 1, 7, 5), (0, 5, 7, 4), (0, 3, 2, 7), (0, 6, 4, 7), (0, 2, 6, 7)]
-_HEXAHEDRON = [(0, 1, 3, 2, 4, 5, 7, 6)]
+#: Two prisms along z on either side of the 000–110 diagonal.
+_PRISMS = [(0, 1, 3, 4, 5, 7), (0, 3, 2, 4, 7, 6)]
+_PARTS = {
+    "tetrahedron": np.array(_TETRAHEDRA),
+    "prism": np.array(_PRISMS),
+    "hexahedron": np.array([(0, 1, 3, 2, 4, 5, 7, 6)]),
+}
 
 
 def box(
-    counts: tuple[int, int, int], size: Floats, origin: Floats, tetrahedra: bool
+    counts: tuple[int, int, int], size: Floats, origin: Floats, cell: str
 ) -> tuple[Floats, Ints]:
-    """Points (n, 3) m, x fastest, and cells of degree 1 of a box cut into ``counts`` blocks."""
+    """Points (n, 3) m, x fastest, and cells of degree 1 of a box of ``counts`` blocks."""
     axes = [np.linspace(0.0, s, n + 1) for s, n in zip(size, counts, strict=True)]
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), z.ravel()]) + origin
-    split = np.array(_TETRAHEDRA if tetrahedra else _HEXAHEDRON)
+    split = _PARTS[cell]
     return points, _corners(counts)[:, split].reshape(-1, split.shape[1])
 
 

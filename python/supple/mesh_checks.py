@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import MeshError
-from supple.kernels.cells import ELEMENTS, FACETS, Element
+from supple.kernels.cells import ELEMENTS, FACETS, NO_NODE, Element
 from supple.mesh_jacobian import smallest_jacobian, volumes
 from supple.mesh_tags import Tag
-from supple.mesh_topology import corner_groups, groups
+from supple.mesh_topology import corner_groups, facet_corners, groups
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -128,9 +128,9 @@ def checked_tags(
             )
         argument = f"ids of tag {name!r}:"
         if tag.kind == "facets":
-            table = FACETS[element.facet]
-            ids = checked_ids(tag.ids, table.nodes, nodes, argument)
-            known, own = corner_groups(facets[:, : table.corners], ids[:, : table.corners])
+            ids = _checked_facets(tag.ids, element, nodes, argument)
+            corners = [facet_corners(block, element) for block in (facets, ids)]
+            known, own = corner_groups(*corners)
             bad = np.flatnonzero(~np.isin(own, known))
             if len(bad):
                 raise MeshError(f"{argument} {some(bad)} are facets of no cell; remove them.")
@@ -140,3 +140,23 @@ def checked_tags(
         ids.flags.writeable = False
         result[str(name)] = Tag(tag.kind, ids)
     return result
+
+
+def _checked_facets(ids: npt.ArrayLike, element: Element, nodes: int, argument: str) -> Ints:
+    """A copy (f, most nodes) of facets; only rows of a narrower kind may end in NO_NODE."""
+    width = element.facets.shape[1]
+    if len(element.facet_elements) == 1:
+        return checked_ids(ids, width, nodes, argument)
+    given = np.asarray(ids) != NO_NODE
+    rows = checked_ids(np.where(given, ids, 0), width, nodes, argument)
+    rows[~given] = NO_NODE
+    counts = given.sum(axis=1)
+    known = [FACETS[kind].nodes for kind in element.facet_elements]
+    gap = (given[:, 1:] & ~given[:, :-1]).any(axis=1)
+    bad = np.flatnonzero(gap | ~np.isin(counts, known))
+    if len(bad):
+        raise MeshError(
+            f"{argument} {some(bad)} must hold {' or '.join(map(str, known))} nodes and then "
+            f"{NO_NODE} up to {width} columns."
+        )
+    return rows

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from supple.kernels.cells import FACETS, Element
 from supple.mesh_tags import Kind, Tag
+from supple.mesh_topology import padded
 
 Ints = npt.NDArray[np.int64]
 Part = tuple[Kind, str, Ints]
@@ -49,13 +50,14 @@ def _together(ids: list[Ints]) -> Ints:
 def _parts(raw: Any, table: Element) -> Iterator[Part]:
     """Every named part, in pieces."""
     yield from _from_fields(raw)
+    facets = [FACETS[kind].meshio for kind in table.facet_elements]
     first = 0
     for number, block in enumerate(raw.cells):
         for name, mask in _named(raw, number):
             if block.type == table.meshio:
                 yield "cells", name, first + np.flatnonzero(mask)
-            elif block.type == FACETS[table.facet].meshio:
-                yield "facets", name, block.data[mask]
+            elif block.type in facets:
+                yield "facets", name, padded(block.data[mask], table)
             elif block.type == "vertex":
                 yield "points", name, block.data[mask].ravel()
         first += len(block.data) if block.type == table.meshio else 0

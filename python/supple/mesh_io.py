@@ -15,10 +15,10 @@ import numpy.typing as npt
 from supple import gmsh1
 from supple.errors import InputError, MeshError
 from supple.files import existing, metres, replacing
-from supple.kernels.cells import ELEMENTS, FACETS, Element
+from supple.kernels.cells import ELEMENTS, NO_NODE, Element
 from supple.mesh_groups import groups_of
 from supple.mesh_tags import Tag
-from supple.mesh_topology import all_facets, corner_groups
+from supple.mesh_topology import all_facets, corner_groups, facet_corners
 
 if TYPE_CHECKING:
     from supple.mesh import Mesh
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+#: Gmsh's number of each VTK node of a prism of 18 nodes, which meshio does not permute.
+_GMSH_WEDGE18 = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16]
 #: Volume cells that no element stands for.
 _OTHER_VOLUMES = ("tetra", "hexahedron", "wedge", "pyramid", "polyhedron", "VTK_")
 
@@ -41,7 +43,7 @@ def read(
     used = np.unique(cells)
     if len(used) and (used[0] < 0 or used[-1] >= len(raw.points)):
         raise MeshError(f"{path} has cells with nodes outside its {len(raw.points)} points.")
-    new = np.full(len(raw.points), -1, dtype=np.int64)
+    new = np.full(len(raw.points) + 1, NO_NODE, dtype=np.int64)  # new[NO_NODE] is NO_NODE
     new[used] = np.arange(len(used))
     tags = _renumbered(groups_of(raw, table), new, new[cells], table)
     return np.asarray(raw.points, dtype=float)[used] * scale, new[cells], table.name, tags
@@ -58,13 +60,18 @@ def read_raw(path: Path) -> Any:
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):
-            return meshio.read(path)
+            raw = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio ends the process on a file it cannot read
         first = next((line.strip() for line in str(error).splitlines() if line.strip()), "")
         cause = f" ({first})" if first and first != "1" else ""
         raise MeshError(
             f"{path} is no mesh file that can be read{cause}; export it as Gmsh, VTU or VTK."
         ) from None
+    if path.suffix.lower() == ".msh":
+        for block in raw.cells:
+            if block.type == "wedge18":
+                block.data = block.data[:, _GMSH_WEDGE18]
+    return raw
 
 
 def _unit_of(path: Path, raw: Any, unit: str | None) -> str:
@@ -107,9 +114,9 @@ def _renumbered(tags: Mapping[str, Tag], new: Ints, cells: Ints, table: Element)
         if tag.kind == "points":
             ids = new[ids][new[ids] >= 0]
         elif tag.kind == "facets":
-            ids = new[ids][(new[ids] >= 0).all(axis=1)]
-            corners = FACETS[table.facet].corners
-            known, own = corner_groups(all_facets(cells, table)[:, :corners], ids[:, :corners])
+            ids = new[ids][((new[ids] != NO_NODE) | (ids == NO_NODE)).all(axis=1)]
+            blocks = [facet_corners(facets, table) for facets in (all_facets(cells, table), ids)]
+            known, own = corner_groups(*blocks)
             ids = ids[np.isin(own, known)]
         if len(ids):
             result[name] = Tag(tag.kind, ids)

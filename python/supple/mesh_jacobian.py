@@ -12,10 +12,14 @@ from supple.kernels.cells import Element
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-#: Inverse of the edges of a regular tetrahedron, as columns: the ideal corner of a tetrahedron.
-_REGULAR = np.linalg.inv(
-    np.array([[1, 0.5, 0.5], [0, 3**0.5 / 2, 3**0.5 / 6], [0, 0, (2 / 3) ** 0.5]])
-)
+#: Inverse of the edges of the ideal cell, as columns: regular tetrahedron, cube, regular prism.
+_IDEAL = {
+    "tetrahedron": np.linalg.inv(
+        np.array([[1, 0.5, 0.5], [0, 3**0.5 / 2, 3**0.5 / 6], [0, 0, (2 / 3) ** 0.5]])
+    ),
+    "hexahedron": np.eye(3),
+    "prism": np.linalg.inv(np.array([[1, 0.5, 0], [0, 3**0.5 / 2, 0], [0, 0, 1.0]])),
+}
 
 
 def jacobians(points: Floats, cells: Ints, element: Element, at: Floats) -> Floats:
@@ -28,7 +32,8 @@ def jacobians(points: Floats, cells: Ints, element: Element, at: Floats) -> Floa
 def quadrature(element: Element) -> tuple[Floats, Floats]:
     """Reference points (q, 3) and weights (q,) that integrate det dX/dξ of a cell exactly.
 
-    Tetrahedron, degree 3: Zienkiewicz, Taylor (2000), vol. 1, table 9.2; cube: Gauss-Legendre.
+    Tetrahedron, degree 3: Zienkiewicz, Taylor (2000), vol. 1, table 9.2; cube: Gauss-Legendre;
+    prism: a triangle's rule times that.
     """
     if element.cell.is_simplex and element.degree == 1:
         return np.full((1, 3), 0.25), np.array([1 / 6])
@@ -36,8 +41,27 @@ def quadrature(element: Element) -> tuple[Floats, Floats]:
         inner = np.vstack([np.full((1, 3), 1 / 6), np.full((3, 3), 1 / 6) + np.eye(3) / 3])
         return np.vstack([np.full((1, 3), 0.25), inner]), np.array([-0.8, *[0.45] * 4]) / 6
     nodes, weights = np.polynomial.legendre.leggauss(element.degree + 1)
-    points = np.array(list(product((nodes + 1) / 2, repeat=3)))
-    return points, np.array([np.prod(w) for w in product(weights / 2, repeat=3)])
+    nodes, weights = (nodes + 1) / 2, weights / 2
+    if element.cell.is_cube:
+        points = np.array(list(product(nodes, repeat=3)))
+        return points, np.array([np.prod(w) for w in product(weights, repeat=3)])
+    flat, flat_weights = _triangle_rule(element.degree)
+    points = np.array([[*xy, z] for z in nodes for xy in flat])
+    return points, np.outer(weights, flat_weights).ravel()
+
+
+def _triangle_rule(degree: int) -> tuple[Floats, Floats]:
+    """Points (q, 2) and weights (q,) of degree 2 · ``degree``: 3 or 6 points.
+
+    Source: Cowper (1973), Int. J. Numer. Methods Eng. 7, in closed form.
+    """
+    if degree == 1:
+        rings = [(1 / 6, 1 / 3)]
+    else:
+        root, spread = np.sqrt(38 - 44 * np.sqrt(0.4)), np.sqrt(213125 - 53320 * np.sqrt(10))
+        rings = [((8 - np.sqrt(10) + s * root) / 18, (620 + s * spread) / 3720) for s in (1, -1)]
+    points = [np.full((3, 2), a) + (1 - 3 * a) * np.eye(3)[:, :2] for a, _ in rings]
+    return np.vstack(points), np.repeat([w / 2 for _, w in rings], 3)
 
 
 def volumes(points: Floats, cells: Ints, element: Element) -> Floats:
@@ -76,13 +100,13 @@ def _kernel_points(element: Element) -> Floats:
 
 
 def mean_ratio(points: Floats, cells: Ints, element: Element) -> Floats:
-    """Quality (n,): 1 regular tetrahedron or cube, 0 flat; the worst of each cell's corners.
+    """Quality (n,): 1 regular tetrahedron, cube or prism, 0 flat; the worst of the corners.
 
     3 det(W)^(2/3) / ‖W‖², W = dX/dξ relative to the ideal corner. Source: Liu and Joe (1994),
-    BIT 34; Knupp (2001), SIAM J. Sci. Comput. 23, for hexahedra.
+    BIT 34; Knupp (2001), SIAM J. Sci. Comput. 23, for other cells.
     """
     worst = np.ones(len(cells))
-    ideal = _REGULAR if element.cell.is_simplex else np.eye(3)
+    ideal = _IDEAL[element.cell.name]
     for at in element.points[: element.corners]:
         corner = jacobians(points, cells, element, at) @ ideal
         det = np.maximum(np.linalg.det(corner), 0.0)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from supple.kernels.cells import ELEMENTS, FACETS, Element
+from supple.kernels.cells import ELEMENTS, FACETS, NO_NODE, Element
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
 def groups(rows: Ints) -> Ints:
-    """Number (n,) of the group of each row (n, k) of ids >= 0: equal rows have equal numbers.
+    """Number (n,) of the group of each row (n, k) of ids: equal rows have equal numbers.
 
+    Ids are >= 0 but in the first column, where they may be anything.
     Columns are folded one by one, so nothing overflows while n · (largest id) < 2⁶³.
     """
     _, group = np.unique(rows[:, 0], return_inverse=True)
@@ -30,44 +31,82 @@ def corner_groups(*blocks: Ints) -> list[Ints]:
 
 
 def all_facets(cells: Ints, element: Element) -> Ints:
-    """Every facet of every cell (cells · facets, nodes per facet), cell by cell, outward."""
-    return cells[:, element.facets].reshape(-1, element.facets.shape[1])
+    """Every facet of every cell (cells · facets, most nodes), cell by cell, outward.
+
+    A row of a facet with fewer nodes than the widest ends in NO_NODE.
+    """
+    facets = cells[:, element.facets]
+    facets[:, element.facets == NO_NODE] = NO_NODE
+    return facets.reshape(-1, element.facets.shape[1])
+
+
+def by_kind(facets: Ints, element: Element) -> list[tuple[Element, Ints]]:
+    """Rows (k,) of ``facets`` (f, most nodes) of each kind that is among them."""
+    kinds = [FACETS[name] for name in element.facet_elements]
+    if len(kinds) == 1:
+        return [(kinds[0], np.arange(len(facets)))]
+    nodes = (facets != NO_NODE).sum(axis=1)
+    found = [(kind, np.flatnonzero(nodes == kind.nodes)) for kind in kinds]
+    return [(kind, rows) for kind, rows in found if len(rows)]
+
+
+def facet_corners(facets: Ints, element: Element) -> Ints:
+    """Corners (f, most corners) of facets (f, most nodes), in both NO_NODE where there is none."""
+    most = max(FACETS[name].corners for name in element.facet_elements)
+    if len(element.facet_elements) == 1:
+        return facets[:, :most]
+    corners = np.full((len(facets), most), NO_NODE, dtype=np.int64)
+    for kind, rows in by_kind(facets, element):
+        corners[rows, : kind.corners] = facets[rows, : kind.corners]
+    return corners
+
+
+def padded(facets: Ints, element: Element) -> Ints:
+    """Facets (f, nodes) of one kind as rows (f, most nodes) of all kinds of ``element``."""
+    missing = element.facets.shape[1] - facets.shape[1]
+    return np.pad(facets, ((0, 0), (0, missing)), constant_values=NO_NODE)
 
 
 def facet_uses(cells: Ints, element: Element) -> tuple[Ints, Ints]:
     """All facets, and how many cells (·,) share each of them."""
     facets = all_facets(cells, element)
-    (group,) = corner_groups(facets[:, : FACETS[element.facet].corners])
+    (group,) = corner_groups(facet_corners(facets, element))
     return facets, np.bincount(group)[group]
 
 
-def edges_of(corners: Ints, element: Element) -> Ints:
-    """Edges (n, edges per cell, 2) of cells or facets by their corners (n, ·), VTK order."""
-    return corners[:, np.array(element.cell.edges)]
+def of_degree(degree: int, element: Element) -> str:
+    """Name of the element of that degree on the same cell, the one with fewest nodes."""
+    same = [e for e in ELEMENTS.values() if e.cell is element.cell and e.degree == degree]
+    return min(same, key=lambda e: e.nodes).name
 
 
-def elevate(points: Floats, cells: Ints, element: Element) -> tuple[Floats, Ints, Element, Ints]:
-    """Degree 2 from degree 1 with nodes at the middles of the edges.
+def elevate(
+    points: Floats, cells: Ints, element: Element, higher: Element
+) -> tuple[Floats, Ints, list[Ints]]:
+    """Degree 2 from degree 1 with nodes at the middles of edges and, if it has them, faces, cells.
 
     Returns:
-        points, cells, the element of degree 2, and the edges (m, 2) whose middles follow the old
-        points, sorted.
+        points, cells, and arrays (m, corners) of the sub-entities whose middles follow the old
+        points: edges, then faces, then cells, each sorted.
     """
-    pairs = np.sort(edges_of(cells, element).reshape(-1, 2), axis=1)
-    edges, middle = np.unique(pairs, axis=0, return_inverse=True)
-    higher = ELEMENTS[element.name[0] + "2"]
-    middle = len(points) + middle.reshape(len(cells), -1)
-    return (
-        np.vstack([points, points[edges].mean(axis=1)]),
-        np.hstack([cells, middle]),
-        higher,
-        edges,
-    )
+    parents: list[Ints] = []
+    places, columns, count = [points], [cells], len(points)
+    for size in sorted({len(entity) for entity in higher.entities} - {1}):
+        local = np.array([entity for entity in higher.entities if len(entity) == size])
+        rows = np.sort(cells[:, local].reshape(-1, size), axis=1)
+        corners, number = np.unique(rows, axis=0, return_inverse=True)
+        places.append(points[corners].mean(axis=1))
+        columns.append(count + number.reshape(len(cells), -1))
+        parents.append(corners)
+        count += len(corners)
+    return np.vstack(places), np.hstack(columns), parents
 
 
-def elevate_facets(facets: Ints, facet: Element, edges: Ints, first: int) -> Ints:
-    """The same facets (f, corners) with the middles of ``edges``, numbered from ``first``."""
-    pairs = np.sort(edges_of(facets, facet).reshape(-1, 2), axis=1)
-    size = int(edges.max()) + 1
-    place = np.searchsorted(edges[:, 0] * size + edges[:, 1], pairs[:, 0] * size + pairs[:, 1])
-    return np.hstack([facets, first + place.reshape(len(facets), -1)])
+def elevate_facets(
+    tagged: Ints, cells: Ints, element: Element, new_cells: Ints, higher: Element
+) -> Ints:
+    """Tagged facets at degree 2: the cells' own facets in the same places, outward."""
+    old, new = all_facets(cells, element), all_facets(new_cells, higher)
+    known, own = corner_groups(facet_corners(old, element), facet_corners(tagged, element))
+    numbers, first = np.unique(known, return_index=True)
+    return new[first[np.searchsorted(numbers, own)]]

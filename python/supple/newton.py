@@ -67,15 +67,15 @@ class Settings:
 
 
 def solve(system: Any, start: Floats, prescribed: Floats, native: Any, settings: Settings) -> Any:
-    """Run; the result's displacement is ``result.u`` (3n)."""
-    if not np.isfinite(system.residual(start.ravel(), 1.0)).all():
+    """Run from ``start`` (dofs); the result's unknowns are ``result.u``, displacements first."""
+    if not np.isfinite(system.residual(start, 1.0)).all():
         raise InputError(
             "the forces are not finite at the start: a parameter is outside of what its law can "
             "carry (a skin of this law wants poisson below 0.5), or the start is inverted."
         )
     report = settings.progress
     hook = None if report is None else lambda i: report(as_dict(i))
-    return system.solve(start.ravel(), np.nan_to_num(prescribed).ravel(), native, hook)
+    return system.solve(start, np.nan_to_num(prescribed), native, hook)
 
 
 def require_converged(
@@ -132,7 +132,8 @@ def worst_cells(result: Any, built: Built, description: Description, count: int 
         ]
         cells.append(int(terms[result.worst.term].ids[result.worst.cell]))
     if len(result.last_residual):
-        size = np.linalg.norm(result.last_residual.reshape(-1, 3), axis=1)
+        n = description.mesh.points.size
+        size = np.linalg.norm(result.last_residual[:n].reshape(-1, 3), axis=1)
         around = np.nan_to_num(size, nan=np.inf)[description.mesh.cells].max(axis=1)
         cells += [int(c) for c in np.argsort(-around, kind="stable")[:count] if c not in cells]
     return cells[:count]

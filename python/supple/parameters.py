@@ -18,7 +18,16 @@ Floats = npt.NDArray[np.float64]
 
 
 def defaults(law: Law, count: int, skin: bool = False) -> dict[str, Floats]:
-    """Each parameter's default as (count, size) rows; a skin keeps its volume: poisson is 0.5."""
+    """Each parameter's default as (count, size) rows; a skin keeps its volume: poisson is 0.5.
+
+    Raises:
+        MaterialError: a skin's energy for a solid.
+    """
+    if not skin and not law.solid:
+        raise MaterialError(
+            f"{law.name} is a skin's energy (psi_surface alone) and cannot make a solid; "
+            "give it to body.skin, or define psi(k, ...) in its file."
+        )
     values: dict[str, Floats] = {}
     for p in law.parameters:
         default = 0.5 if skin and p.name == "poisson" else p.default
@@ -42,18 +51,33 @@ def given(law: Law, values: Mapping[str, Any], count: int, skin: bool = False) -
 
 
 def rows(parameter: Parameter, value: Any, count: int, skin: bool = False) -> Floats:
-    """One value for all cells, or one for each, as (count, size) float64."""
+    """One value for all cells, or one for each, as (count, size) rows; directions at length 1."""
     name, size = parameter.name, parameter.kind.size
     kind = parameter.kind
     if skin and name == "poisson":  # the membrane keeps its volume, so 0.5 is its natural value
         kind = replace(kind, open=False)
     array = per_cell(name, value, count, size)
+    if size > 1:
+        return _unit_vectors(name, array)
     if not kind.admits(array):
         raise MaterialError(
             f"{name} must lie in {kind.range()}{_unit(kind)}, got {_worst(kind, array):g}; "
             f"its law's own default is {parameter.default}."
         )
     return array
+
+
+def _unit_vectors(name: str, array: Floats) -> Floats:
+    """Rows at length 1, scaled by their largest entry first so that nothing over- or underflows."""
+    largest = np.abs(array).max(axis=1, keepdims=True)
+    wrong = ~(np.isfinite(largest) & (largest > 0)).ravel()
+    if wrong.any():
+        row = array[wrong][0].tolist()
+        raise MaterialError(
+            f"{name} must be a direction other than zero, got {row}; give three finite numbers."
+        )
+    scaled = array / largest
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=1, keepdims=True))
 
 
 def per_cell(name: str, value: Any, count: int, size: int = 1) -> Floats:

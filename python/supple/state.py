@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import terms
-from .core import core
 from .errors import InputError
+from .projection import to_nodes
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -29,6 +29,7 @@ class PointValues:
     P: Floats  # (c, q, 3, 3) Pa
     psi: Floats  # (c, q) Pa
     volume: Floats  # (c, q) m³ at rest
+    places: Floats  # (q, 3) in the reference cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class Equilibrium:
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
+        pressure: (n,) Pa, the multiplier of a mixed formulation, σ_vol = p g'(J), so positive in
+            tension; linear between the corners. None in the others.
     """
 
     u: Floats
@@ -54,6 +57,7 @@ class Equilibrium:
     warnings: tuple[str, ...]
     _solved: terms.Description = field(repr=False)  # as it was, with its mesh
     _form: str = field(repr=False)
+    pressure: Floats | None = None
 
     @property
     def points(self) -> Floats:
@@ -61,13 +65,36 @@ class Equilibrium:
         return np.asarray(self._solved.mesh.points + self.u)
 
     def deformation_gradient(self, at: str = "cells") -> Floats:
-        """F from rest to loaded (c, 3, 3), cell averages, or (c, q, 3, 3) with at="quadrature"."""
+        """F from rest to loaded.
+
+        Args:
+            at: "cells" for averages (c, 3, 3) by rest volume; "quadrature" for the points
+                themselves (c, q, 3, 3); "nodes" for their least-squares fit (n, 3, 3) by the
+                element's continuous functions over the rest shape, which smears jumps between
+                regions.
+
+        Raises:
+            InputError: another ``at``.
+        """
         return self._at(self._values.F, at)
+
+    def right_cauchy_green(self, at: str = "cells") -> Floats:
+        """C = FᵀF, same shapes as `deformation_gradient`."""
+        F = self._values.F
+        return self._at(np.swapaxes(F, -1, -2) @ F, at)
 
     def green_lagrange(self, at: str = "cells") -> Floats:
         """E = (FᵀF - I)/2, same shapes as `deformation_gradient`."""
         F = self._values.F
         return self._at(0.5 * (np.swapaxes(F, -1, -2) @ F - np.eye(3)), at)
+
+    def first_piola(self, at: str = "cells") -> Floats:
+        """P = ∂ψ/∂F, Pa, same shapes as `deformation_gradient`."""
+        return self._at(self._values.P, at)
+
+    def second_piola(self, at: str = "cells") -> Floats:
+        """S = F⁻¹P, Pa, same shapes as `deformation_gradient`."""
+        return self._at(np.linalg.solve(self._values.F, self._values.P), at)
 
     def cauchy(self, at: str = "cells") -> Floats:
         """σ = P Fᵀ / J, Pa, same shapes as `deformation_gradient`."""
@@ -75,9 +102,14 @@ class Equilibrium:
         J = np.linalg.det(F)[..., None, None]
         return self._at(P @ np.swapaxes(F, -1, -2) / J, at)
 
-    def volume_ratio(self) -> Floats:
-        """J (c,), the smallest of each cell's quadrature points."""
-        return np.asarray(np.linalg.det(self._values.F).min(axis=1))
+    def energy_density(self, at: str = "cells") -> Floats:
+        """ψ, Pa, per rest volume: (c,), (c, q) or (n,), as `deformation_gradient`."""
+        return self._at(self._values.psi, at)
+
+    def volume_ratio(self, at: str = "smallest") -> Floats:
+        """J = det F: "smallest" (c,) of each cell's points, or as `energy_density`."""
+        J = np.asarray(np.linalg.det(self._values.F))
+        return np.asarray(J.min(axis=1)) if at == "smallest" else self._at(J, at)
 
     def von_mises(self) -> Floats:
         """sqrt(3/2 s:s) of the averaged Cauchy stress (c,), Pa."""
@@ -100,7 +132,11 @@ class Equilibrium:
     @cached_property
     def _values(self) -> PointValues:
         mesh = self._solved.mesh
-        system = core().System(np.ascontiguousarray(mesh.points).ravel())
+        system = terms.new_system(self._solved)
+        nodes = terms.pressure_nodes(self._solved)
+        unknowns = (
+            self.u.ravel() if self.pressure is None else np.append(self.u, self.pressure[nodes])
+        )
         parts, rows = [], []
         for region in self._solved.regions:
             if len(region.ids) == 0:
@@ -108,7 +144,7 @@ class Equilibrium:
             term = terms.region_term(system, self._solved, region, self._form)
             terms.set_values(term, region.values)
             q = len(term.weights)
-            table = term.tabulate("points", self.u.ravel()).reshape(len(region.ids), q, 20)
+            table = term.tabulate("points", unknowns).reshape(len(region.ids), q, 20)
             table[..., 19] *= term.weights
             parts.append(table)
             rows.append(region.ids)
@@ -116,15 +152,19 @@ class Equilibrium:
         table[np.concatenate(rows)] = np.concatenate(parts)
         shape = (*table.shape[:2], 3, 3)
         F, P = table[..., :9].reshape(shape), table[..., 9:18].reshape(shape)
-        return PointValues(F, P, table[..., 18], table[..., 19])
+        return PointValues(F, P, table[..., 18], table[..., 19], term.quadrature)
 
     def _at(self, values: Floats, at: str) -> Floats:
         if at == "quadrature":
             return values
+        volume = self._values.volume
+        if at == "nodes":
+            rest = self._solved.mesh.points if self._form == "direct" else self.points
+            return to_nodes(self._solved.mesh, rest, self._values.places, values)
         if at != "cells":
-            raise InputError(f'at must be "cells" or "quadrature", got {at!r}.')
-        weight = self._values.volume / self._values.volume.sum(axis=1, keepdims=True)
-        return np.asarray(np.einsum("cq,cqij->cij", weight, values))
+            raise InputError(f'at must be "cells", "quadrature" or "nodes", got {at!r}.')
+        weight = volume / volume.sum(axis=1, keepdims=True)
+        return np.asarray(np.einsum("cq,cq...->c...", weight, values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,21 +198,34 @@ class Rest(Equilibrium):
         return self._solved.mesh.moved(self.points)
 
 
-def outcome(result: Any, built: terms.Built, fixed: npt.NDArray[np.bool_]) -> dict[str, Any]:
+def outcome(
+    result: Any, built: terms.Built, d: terms.Description, fixed: npt.NDArray[np.bool_]
+) -> dict[str, Any]:
     """The fields of an `Equilibrium` that a converged result gives."""
     from .newton import as_dict
 
     t = built.system.timings
     has_energy = built.system.has_energy()
     return {
-        "u": result.u.reshape(-1, 3),
+        "u": result.u[: fixed.size].reshape(-1, 3),
+        "pressure": _pressure(result.u[fixed.size :] * built.scalar_unit, d),
         "iterations": sum(1 for i in result.history if i.iteration > 0),
         "history": [as_dict(i) for i in result.history],
         "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
-        "reactions": np.where(fixed, result.residual.reshape(-1, 3), 0.0),
+        "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
         "warnings": _warnings(built.system.volume_ratio(result.u)),
     }
+
+
+def _pressure(corners: Floats, d: terms.Description) -> Floats | None:
+    """The pressures of the corners, and of every other node what a linear field has there."""
+    if not len(corners):
+        return None
+    mesh, p = d.mesh, np.zeros(len(d.mesh.points))
+    p[terms.pressure_nodes(d)] = corners
+    p[mesh.cells] = p[mesh.cells[:, : mesh.table.corners]] @ mesh.table.corner_values().T
+    return p
 
 
 def _warnings(smallest: Any) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import InputError
+from .mesh_topology import by_kind
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -67,15 +68,11 @@ def node_shares(mesh: Mesh, nodes: Ints) -> Floats:
     Raises:
         InputError: no boundary facet has all of its nodes there.
     """
-    facets = mesh.boundary(nodes)
-    corners = mesh.points[facets[:, : 3 if mesh.table.cell.is_simplex else 4]]
-    if corners.shape[1] == 3:
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    else:
-        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    area = 0.5 * np.linalg.norm(normal, axis=1)
-    total = np.zeros(len(mesh.points))
-    np.add.at(total, facets, np.repeat(area[:, None] / facets.shape[1], facets.shape[1], axis=1))
+    total, facets = np.zeros(len(mesh.points)), mesh.boundary(nodes)
+    for kind, rows in by_kind(facets, mesh.table):
+        own = facets[rows, : kind.nodes]
+        area = _flat_areas(mesh.points[own[:, : kind.corners]])
+        np.add.at(total, own, np.repeat(area[:, None] / kind.nodes, kind.nodes, axis=1))
     share = total[nodes] / total[nodes].sum()
     if (share == 0).any():
         raise InputError(
@@ -83,6 +80,14 @@ def node_shares(mesh: Mesh, nodes: Ints) -> Floats:
             "inside the chosen region; choose whole facets."
         )
     return np.asarray(share)
+
+
+def _flat_areas(corners: Floats) -> Floats:
+    """Areas (f,) of flat triangles (f, 3, 3) or quadrilaterals (f, 4, 3)."""
+    first, second = (1, 2) if corners.shape[1] == 3 else (2, 3)
+    start = 0 if corners.shape[1] == 3 else 1
+    normal = np.cross(corners[:, first] - corners[:, 0], corners[:, second] - corners[:, start])
+    return np.asarray(0.5 * np.linalg.norm(normal, axis=1))
 
 
 def _rigid_modes(offsets: Floats, size: float) -> Floats:

@@ -8,6 +8,7 @@ the terms that exist, so pattern, reduction and symbolic factor live as long as 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +38,7 @@ class Region:
 
 @dataclass
 class FacetLoad:
-    """A traction (3,) or a pressure (1,), Pa, on boundary facets in VTK order."""
+    """A traction (3,) or a pressure (1,), Pa, on boundary facets as `Mesh.boundary` gives them."""
 
     facets: Ints
     value: Floats
@@ -62,11 +63,20 @@ class Description:
     density: Floats  # (c, 1) kg/m³
     gravity: Floats  # (3,) m/s²
     forces: Floats  # (n, 3) N
-    quadrature: int | None = None
+    quadrature: int | None = None  # may name its scheme (kernels.degree)
+    formulation: str = "displacement"
     tractions: list[FacetLoad] = field(default_factory=list)
     pressures: list[FacetLoad] = field(default_factory=list)
-    skins: list[Region] = field(default_factory=list)  # ids are facets (f, nodes), VTK order
+    skins: list[Region] = field(default_factory=list)  # ids are rows of `Mesh.boundary`
     slides: list[Slide] = field(default_factory=list)
+
+
+@dataclass
+class FacetTerm:
+    """The term of one kind of facet, and which rows of the load's or skin's facets it holds."""
+
+    term: Any
+    rows: Ints
 
 
 @dataclass
@@ -75,32 +85,42 @@ class Built:
 
     system: Any
     regions: list[Any]
-    skins: list[Any]
-    tractions: list[Any]
-    pressures: list[Any]
+    skins: list[list[FacetTerm]]
+    tractions: list[list[FacetTerm]]
+    pressures: list[list[FacetTerm]]
     body_force: Any
     forces: Any
+    scalar_unit: float = 1.0  # Pa/m, see KernelTerm::set_scalar_unit
 
 
-def build(d: Description, inverse: bool = False, density_of: str = "rest") -> Built:
-    """Make the system; kernels that are not compiled yet are compiled here."""
-    system = core().System(np.ascontiguousarray(d.mesh.points).ravel())
+def build(
+    d: Description, inverse: bool = False, density_of: str = "rest", suffix: str = ""
+) -> Built:
+    """Make the system; kernels that are not compiled yet are compiled here.
+
+    Args:
+        suffix: SENSITIVITY for terms that hold the sensitivity kernels instead.
+    """
+    system = new_system(d)
     built = Built(system, [], [], [], [], None, core().NodalForce(np.zeros(d.mesh.points.size)))
-    form = "inverse" if inverse else "direct"
+    built.scalar_unit = modulus(d) / d.mesh.size
+    form = ("inverse" if inverse else "direct") + suffix
     for region in d.regions:
         built.regions.append(region_term(system, d, region, form) if len(region.ids) else None)
+        if built.regions[-1] is not None:
+            built.regions[-1].set_scalar_unit(built.scalar_unit)
     per_rest = inverse and density_of == "rest"
     load = "body_force_rest" if per_rest else "body_force"
-    built.body_force = _load(system, load, d.mesh.element, _cells(d.mesh))
+    built.body_force = _load(system, load + suffix, d.mesh.element, _cells(d.mesh))
     for traction in d.tractions:
         moved = (traction.per == "rest") == inverse
         unit = "traction_moved" if moved else "traction"
-        built.tractions.append(_load(system, unit, d.mesh.table.facet, _facets(d, traction.facets)))
+        built.tractions.append(_facet_load(system, d, unit + suffix, traction))
     for pressure in d.pressures:
         unit = "pressure" if inverse else "pressure_moved"
-        built.pressures.append(_load(system, unit, d.mesh.table.facet, _facets(d, pressure.facets)))
+        built.pressures.append(_facet_load(system, d, unit + suffix, pressure))
     for skin in d.skins:
-        built.skins.append(skin_term(system, d, skin, f"skin_{form}"))
+        built.skins.append(skin_terms(system, d, skin, f"skin_{form}"))
     for slide in d.slides:
         system.add(_slide(system, slide, inverse))
     system.add(built.forces)
@@ -109,31 +129,70 @@ def build(d: Description, inverse: bool = False, density_of: str = "rest") -> Bu
 
 def refresh(built: Built, d: Description) -> None:
     """Hand the description's present values to the terms."""
-    for term, region in [*zip(built.regions, d.regions, strict=True),
-                         *zip(built.skins, d.skins, strict=True)]:  # fmt: skip
+    for term, region in zip(built.regions, d.regions, strict=True):
         if term is not None:
             set_values(term, region.values)
+    for parts, skin in zip(built.skins, d.skins, strict=True):
+        for part in parts:
+            set_values(part.term, {n: v[part.rows] for n, v in skin.values.items()})
     built.body_force.set_field("value", (d.density * d.gravity).ravel())
-    for term, load in [*zip(built.tractions, d.tractions, strict=True),
-                       *zip(built.pressures, d.pressures, strict=True)]:  # fmt: skip
-        term.set_field("value", np.tile(load.value, len(load.facets)))
+    for parts, load in [*zip(built.tractions, d.tractions, strict=True),
+                        *zip(built.pressures, d.pressures, strict=True)]:  # fmt: skip
+        for part in parts:
+            part.term.set_field("value", np.tile(load.value, len(part.rows)))
     built.forces.set_forces(d.forces.ravel())
+
+
+def new_system(d: Description) -> Any:
+    """A runtime system of the mesh's dofs, and of the pressures in a mixed formulation."""
+    return core().System(np.ascontiguousarray(d.mesh.points).ravel(), pressure_nodes(d).tolist())
+
+
+def pressure_nodes(d: Description) -> Ints:
+    """Nodes that carry a pressure: the corners in a mixed formulation, none in the others."""
+    corners = d.mesh.table.corners if d.formulation == "mixed" else 0
+    return np.unique(d.mesh.cells[:, :corners]).astype(np.int64)
+
+
+def modulus(d: Description) -> float:
+    """Largest modulus among the parameters, Pa; where p carries the volume, that of psi_dev."""
+    found = []
+    for region in d.regions:
+        names = {p.name for p in region.law.parameters if p.kind.unit == "Pa"}
+        if d.formulation == "mixed":
+            names &= set(region.law.arguments("psi_dev", region.values))
+        found += [float(region.values[name].max()) for name in names if len(region.ids)]
+    return max(found, default=1.0)
 
 
 def region_term(system: Any, d: Description, region: Region, form: str) -> Any:
     """The term of a law on its cells, added to the system."""
+    from .kernels.unit import FORMULATIONS, Unit
+
+    unit = Unit(FORMULATIONS[d.formulation] + form, d.mesh.element, region.law.path, d.quadrature)
+    cells = _cells(d.mesh)[region.ids]
+    if d.formulation == "mixed":
+        corners = cells[:, : d.mesh.table.corners]
+        scalars = np.searchsorted(pressure_nodes(d), corners) + len(d.mesh.points)
+        cells = np.hstack([cells, scalars.astype(np.int32)])
+    return _add(system, compiled(unit), cells)
+
+
+def mass_term(system: Any, mesh: Mesh) -> Any:
+    """The mass matrix of the mesh's shape functions, on the points of the system."""
     from .kernels.unit import Unit
 
-    unit = Unit(form, d.mesh.element, region.law.path, d.quadrature)
-    return _add(system, compiled(unit), _cells(d.mesh)[region.ids])
+    return core().KernelTerm(compiled(Unit("mass", mesh.element)), system, _cells(mesh))
 
 
-def skin_term(system: Any, d: Description, skin: Region, form: str) -> Any:
-    """The term of a skin on its facets, added to the system."""
+def skin_terms(system: Any, d: Description, skin: Region, form: str) -> list[FacetTerm]:
+    """The terms of a skin, one a kind of facet, added to the system."""
     from .kernels.unit import Unit
 
-    unit = Unit(form, d.mesh.table.facet, skin.law.path)
-    return _add(system, compiled(unit), _facets(d, skin.ids))
+    return [
+        FacetTerm(_add(system, compiled(Unit(form, kind, skin.law.path)), facets), rows)
+        for kind, facets, rows in _facets(d.mesh, skin.ids)
+    ]
 
 
 def set_values(term: Any, values: dict[str, Floats]) -> None:
@@ -148,6 +207,13 @@ def _load(system: Any, form: str, element: str, cells: npt.NDArray[np.int32]) ->
     term = _add(system, compiled(Unit(form, element)), cells)
     term.is_load = True
     return term
+
+
+def _facet_load(system: Any, d: Description, form: str, load: FacetLoad) -> list[FacetTerm]:
+    return [
+        FacetTerm(_load(system, form, kind, facets), rows)
+        for kind, facets, rows in _facets(d.mesh, load.facets)
+    ]
 
 
 def _add(system: Any, library: str, cells: npt.NDArray[np.int32]) -> Any:
@@ -169,12 +235,12 @@ def _cells(mesh: Mesh) -> npt.NDArray[np.int32]:
     return np.ascontiguousarray(mesh.cells[:, mesh.table.from_vtk], dtype=np.int32)
 
 
-def _facets(d: Description, facets: Ints) -> npt.NDArray[np.int32]:
-    """Facets in kernel order."""
-    from .kernels.cells import FACETS
+def _facets(mesh: Mesh, facets: Ints) -> Iterator[tuple[str, npt.NDArray[np.int32], Ints]]:
+    """Facets in kernel order and which rows they are, by the name of their element."""
+    from .mesh_topology import by_kind
 
-    order = FACETS[d.mesh.table.facet].from_vtk
-    return np.ascontiguousarray(facets[:, order], dtype=np.int32)
+    for kind, rows in by_kind(facets, mesh.table):
+        yield kind.name, np.ascontiguousarray(facets[np.ix_(rows, kind.from_vtk)], np.int32), rows
 
 
 def snapshot(d: Description) -> Description:

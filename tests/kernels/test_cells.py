@@ -6,10 +6,11 @@ import basix
 import numpy as np
 import pytest
 
-from supple.kernels.cells import ELEMENTS, FACETS
+from supple.kernels.cells import ELEMENTS, FACETS, NO_NODE
 
 EVERY = ELEMENTS | FACETS
-#: VTK's midside nodes by the corners that they lie between (vtkCellType figures 22, 23, 24, 25).
+#: VTK's other nodes by the corners that they lie between. vtkCellType 22 to 25 and 28, 29, 32: the
+#: faces of 29 (27 nodes) are -x, +x, -y, +y, -z, +z, those of 32 (18 nodes) its quadrilaterals.
 VTK_EDGES = {
     "T2": [(0, 1), (1, 2), (2, 0)],
     "S2": [(0, 1), (1, 2), (2, 3), (3, 0)],
@@ -18,19 +19,46 @@ VTK_EDGES = {
         *[(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)],
         *[(0, 4), (1, 5), (2, 6), (3, 7)],
     ],
+    "Pr2": [
+        *[(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)],
+        *[(0, 1, 3, 4), (1, 2, 4, 5), (2, 0, 5, 3)],
+    ],
 }
+VTK_EDGES["S2L"] = [*VTK_EDGES["S2"], (0, 1, 2, 3)]
+VTK_EDGES["Q2L"] = [
+    *VTK_EDGES["Q2"],
+    *[(0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)],
+    tuple(range(8)),
+]
+#: vtkTriQuadraticHexahedron::GetParametricCoords, nodes 20 to 26, and those of
+#: vtkBiQuadraticQuadraticWedge, nodes 15 to 17.
+VTK_PLACES = {
+    "Q2L": {
+        20: (0, 0.5, 0.5), 21: (1, 0.5, 0.5), 22: (0.5, 0, 0.5), 23: (0.5, 1, 0.5),
+        24: (0.5, 0.5, 0), 25: (0.5, 0.5, 1), 26: (0.5, 0.5, 0.5),
+    },
+    "Pr2": {15: (0.5, 0, 0.5), 16: (0.5, 0.5, 0.5), 17: (0, 0.5, 0.5)},
+}  # fmt: skip
 
 
 def basix_nodes(element):
     """Basix' own node coordinates; serendipity by its geometry: vertices, then edge midpoints."""
     cell = basix.CellType[element.cell.name]
-    if element.name[0] in "PT" or element.degree == 1:
+    if element.name not in ("Q2", "S2"):
         return basix.create_element(
             basix.ElementFamily.P, cell, element.degree, basix.LagrangeVariant.equispaced
         ).points
     vertices = basix.geometry(cell)
     middles = [vertices[list(edge)].mean(axis=0) for edge in basix.topology(cell)[1]]
     return np.vstack([vertices, middles])
+
+
+def loops(element):
+    """Nodes (k,) of each facet and how many of them are corners."""
+    corners = {FACETS[name].nodes: FACETS[name].corners for name in element.facet_elements}
+    for row in element.facets:
+        own = row[row != NO_NODE]
+        yield own, corners[len(own)]
 
 
 def newell_normal(loop):
@@ -57,13 +85,20 @@ def test_permutations_undo_each_other(name):
 
 @pytest.mark.parametrize("name", VTK_EDGES)
 def test_midside_nodes_lie_where_vtk_puts_them(name):
-    """Node corners + i is the midpoint of VTK's edge i."""
+    """Node corners + i is the midpoint of VTK's edge, face or cell i."""
     element = EVERY[name]
-    ends = element.points[np.array(VTK_EDGES[name])]
-    np.testing.assert_array_equal(element.points[element.corners :], ends.mean(axis=1))
+    middles = [element.points[list(ends)].mean(axis=0) for ends in VTK_EDGES[name]]
+    np.testing.assert_array_equal(element.points[element.corners :], middles)
 
 
-@pytest.mark.parametrize("name", ["Q1", "Q2"])
+@pytest.mark.parametrize("name", VTK_PLACES)
+def test_nodes_on_faces_lie_at_vtks_parametric_coordinates(name):
+    """As VTK states them, not by corners."""
+    for node, place in VTK_PLACES[name].items():
+        np.testing.assert_array_equal(ELEMENTS[name].points[node], place)
+
+
+@pytest.mark.parametrize("name", ["Q1", "Q2", "Q2L"])
 def test_hexahedron_corners_go_round_the_bottom_then_the_top(name):
     """VTK 12: counter-clockwise seen from above at z = 0, then the same at z = 1."""
     corners = ELEMENTS[name].points[:8]
@@ -72,22 +107,32 @@ def test_hexahedron_corners_go_round_the_bottom_then_the_top(name):
     assert newell_normal(corners[:4])[2] == 1.0
 
 
+@pytest.mark.parametrize("name", ["Pr1", "Pr2"])
+def test_the_first_triangle_of_a_prism_turns_towards_the_second(name):
+    """Gmsh's and meshio's wedge, and VTK's of 18 nodes: counter-clockwise seen from the top."""
+    corners = ELEMENTS[name].points[:6]
+    np.testing.assert_array_equal(corners[:, 2], [0, 0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(corners[:3, :2], corners[3:, :2])
+    assert newell_normal(corners[:3])[2] == 0.5
+
+
 @pytest.mark.parametrize("name", ELEMENTS)
 def test_facet_nodes_close_the_cell_and_point_outward(name):
     """The facets' area vectors sum to zero, each points away from the centre; midpoints fit."""
     element = ELEMENTS[name]
-    facet = FACETS[element.facet]
     centre = element.points[: element.corners].mean(axis=0)
     total = np.zeros(3)
-    for row in element.facets:
+    for row, corners in loops(element):
         nodes = element.points[row]
-        loop = nodes[: facet.corners]
+        loop = nodes[:corners]
         normal = newell_normal(loop)
         assert normal @ (loop.mean(axis=0) - centre) > 0
         total += normal
         if element.degree == 2:
             middles = (loop + np.roll(loop, -1, axis=0)) / 2
-            np.testing.assert_array_equal(nodes[facet.corners :], middles)
+            np.testing.assert_array_equal(nodes[corners : 2 * corners], middles)
+            for node in nodes[2 * corners :]:
+                np.testing.assert_array_equal(node, loop.mean(axis=0))
     np.testing.assert_allclose(total, 0, atol=1e-15)
 
 
@@ -95,7 +140,7 @@ def test_facet_nodes_close_the_cell_and_point_outward(name):
 def test_every_facet_node_is_on_the_facet_and_none_is_missing(name):
     """A facet holds exactly the cell's nodes in its plane."""
     element = ELEMENTS[name]
-    for row in element.facets:
+    for row, _ in loops(element):
         a, b, c = element.points[row[:3]]
         distance = (element.points - a) @ np.cross(b - a, c - a)
         np.testing.assert_array_equal(np.sort(row), np.flatnonzero(np.abs(distance) < 1e-14))
@@ -105,11 +150,20 @@ def test_every_facet_node_is_on_the_facet_and_none_is_missing(name):
 def test_facets_stay_outward_in_kernel_order(name):
     """(v1 − v0) × (v2 − v0) of Basix' vertices points out: the kernels' normal."""
     element = ELEMENTS[name]
-    facet = FACETS[element.facet]
+    order = {FACETS[kind].nodes: FACETS[kind].from_vtk for kind in element.facet_elements}
     centre = element.points[: element.corners].mean(axis=0)
-    for row in element.facets[:, facet.from_vtk]:
-        a, b, c = element.points[row[:3]]
+    for row, _ in loops(element):
+        a, b, c = element.points[row[order[len(row)]][:3]]
         assert np.cross(b - a, c - a) @ (a - centre) > 0
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_shape_functions_are_those_of_a_partition_of_unity(name):
+    """One at their own node, zero at the others, and they sum to one anywhere."""
+    element = EVERY[name]
+    np.testing.assert_allclose(element.values(element.points), np.eye(element.nodes), atol=1e-13)
+    at = np.random.default_rng(1).uniform(0.05, 0.3, (5, element.cell.dim))
+    np.testing.assert_allclose(element.values(at).sum(axis=1), 1, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", EVERY)

@@ -66,7 +66,10 @@ def test_a_name_that_is_no_unit_is_refused(wrong, tmp_path):
 
 
 def test_names_of_units_are_read_back(tmp_path):
-    """parse is the inverse of name, with and without a degree."""
-    for name in ("neo_hookean.P1.direct", "mine.Q2.inverse.q6", "x.S2.skin_direct", "traction.T1"):
+    """parse is the inverse of name, with and without degree and scheme."""
+    for name in (
+        *("neo_hookean.P1.direct", "mine.Q2.inverse.q6", "x.S2.skin_direct", "traction.T1"),
+        *("x.Pr2.inverse.q6-gauss_jacobi", "x.Q2L.direct.q4-gll", "pressure_moved.S2L"),
+    ):
         assert unit.parse(name, tmp_path).name == name
-    assert len({u.name for u in unit.loads()}) == len(unit.loads()) == 2 * 4 + 4 * 4
+    assert len({u.name for u in unit.loads()}) == len(unit.loads()) == 2 * 7 + 4 * 5

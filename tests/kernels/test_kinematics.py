@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from supple.kernels import energy
-from supple.kernels.kinematics import Kinematics
+from supple.kernels.kinematics import Kinematics, Unavailable
+from supple.kernels.membrane_kinematics import SurfaceKinematics
 from supple.kernels.tensors import Tensor
 
 F = np.array([[1.1, 0.2, 0.0], [0.1, 0.9, 0.15], [-0.05, 0.1, 1.2]])
@@ -76,3 +77,53 @@ def test_lame_constants_are_those_of_the_textbook():
     mu, lmbda = energy.lame(3e3, 0.3)
     assert mu * (3 * lmbda + 2 * mu) / (lmbda + mu) == pytest.approx(3e3)
     assert lmbda / (2 * (lmbda + mu)) == pytest.approx(0.3)
+
+
+def test_sums_over_stretches_are_those_of_the_singular_values(k):
+    """Σ λ^α for exponents of either sign, and Σ ln²λ."""
+    for alpha in (-2.5, 0.7, 2.0, 11.0):
+        assert k.stretch_sum(alpha) == pytest.approx((STRETCHES**alpha).sum(), rel=1e-13)
+    assert k.log_stretch_squares == pytest.approx((np.log(STRETCHES) ** 2).sum(), rel=1e-13)
+
+
+def test_further_strains_and_fibre_invariants_are_their_definitions(k):
+    """Ē = (C J^(-2/3) - I)/2, ε = sym F - I, I4_bar = J^(-2/3) I4, I5 = |C f|²."""
+    f, C = np.array([0.0, 0.6, 0.8]).view(Tensor), F.T @ F
+    unit = np.linalg.det(F) ** (-2 / 3)
+    np.testing.assert_allclose(k.E_bar, (unit * C - np.eye(3)) / 2)
+    np.testing.assert_allclose(k.small_strain, (F + F.T) / 2 - np.eye(3))
+    assert k.I4_bar(f) == pytest.approx(unit * f @ C @ f)
+    assert k.I5(f) == pytest.approx(np.asarray(f) @ C @ C @ np.asarray(f))
+
+
+def test_a_membrane_has_the_invariants_of_its_plane():
+    """I1_s = λ1² + λ2², J_s = λ1 λ2, λ3 = 1/J_s; the sums over stretches take all three."""
+    m = SurfaceKinematics(np.diag([1.44, 0.81]).view(Tensor))
+    assert pytest.approx(2.25) == m.I1_s
+    assert pytest.approx(1.08) == m.J_s
+    assert m.J == 1.0
+    assert m.trace_U == pytest.approx(1.2 + 0.9 + 1 / 1.08)
+    assert m.stretch_sum(3.0) == pytest.approx(1.2**3 + 0.9**3 + 1.08**-3)
+    assert pytest.approx(2.25 + 1.08**-2) == m.I1
+
+
+@pytest.mark.parametrize("word", ["I1_s", "J_s"])
+def test_a_solid_has_no_plane(k, word):
+    """Said in one sentence with the word to use."""
+    with pytest.raises(Unavailable, match=rf"k\.{word} is of a membrane's plane; use it in"):
+        getattr(k, word)
+
+
+def test_axes_are_orthonormal_and_right_handed():
+    """The first kept, the second's part across it, their vector product."""
+    f = np.array([2.0, 1.0, -2.0]).view(Tensor) / 3
+    q = np.column_stack(energy.axes(f, np.array([0.3, 1.0, 0.2]).view(Tensor)))
+    np.testing.assert_allclose(q.T @ q, np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(q[:, 0], f)
+    assert np.linalg.det(q) == pytest.approx(1.0)
+    assert q[:, 1] @ [0.3, 1.0, 0.2] > 0
+
+
+def test_choose_takes_the_first_above_zero_only():
+    """At zero itself the second."""
+    assert [energy.choose(x, 1.0, 2.0) for x in (-1.0, 0.0, 1e-300)] == [2.0, 2.0, 1.0]

@@ -129,6 +129,11 @@ def test_assemble_leaves_supports_out():
             "formulation must be",
         ),
         (lambda: body(quadrature=0), supple.InputError, "quadrature must be a degree"),
+        (
+            lambda: body(quadrature=(4, "keast")),
+            supple.InputError,
+            "one of default, gauss_jacobi, gll, got 'keast'",
+        ),
         (lambda: body().gravity(9.81), supple.InputError, "gravity must be three|g must be three"),
         (lambda: body().force(right, (1.0, 2.0)), supple.InputError, "force must be three"),
         (lambda: body().traction(right, (0, 0, np.nan)), supple.InputError, "traction must be thr"),

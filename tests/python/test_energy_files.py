@@ -10,9 +10,11 @@ import pytest
 import supple
 
 HEAD = (
-    '"""A law; its source."""\nfrom supple.energy import Kinematics, Pa, Ratio, inner, ln, tr\n\n\n'
+    '"""A law; its source."""\n'
+    "from supple.energy import Direction, Kinematics, Pa, Ratio, inner, ln, tr\n\n\n"
 )
 GOOD = "    return young / 2 * (k.I1 - 3 - 2 * ln(k.J))\n"
+PLAIN = "    return k.I1 - 3\n"
 PSI = "def psi(k: Kinematics, young: Pa = 3e3):\n"
 ESCAPE = "().__class__.__base__.__subclasses__()"
 MESH = supple.Mesh.box((1, 1, 1), (1.0, 1.0, 1.0), "P1")
@@ -24,7 +26,7 @@ READING = {
     "unknown import": ("from supple.energy import lam\n" + PSI + GOOD, 1, "did you mean lame"),
     "unknown name": (PSI + "    return youn * k.I1\n", 2, "unknown name youn; did you mean young"),
     "builtin": (PSI + "    return open(young)\n", 2, "unknown name open"),
-    "unknown of k": (PSI + "    return young * k.I5\n", 2, "k has no I5; did you mean I"),
+    "unknown of k": (PSI + "    return young * k.I6\n", 2, "k has no I6; did you mean I"),
     "no default": ("def psi(k: Kinematics, young: Pa):\n" + GOOD, 1, "young needs a type and a"),
     "no type": ("def psi(k: Kinematics, young=3e3):\n" + GOOD, 1, "young: Pa = 1e3"),
     "unknown type": ("def psi(k, young: float = 1.0):\n" + GOOD, 1, "use Pa, Ratio, Number"),
@@ -63,6 +65,22 @@ READING = {
     "no return": (PSI + "    a = young\n", 1, "end it with return"),
     "not Python": (PSI + "    return young *\n", 2, "is not Python"),
     "psi_dev alone": (PSI.replace("psi", "psi_dev") + GOOD, None, "add psi_vol"),
+    "direction too short": (
+        "def psi(k, f: Direction = (1.0, 0.0)):\n" + PLAIN,
+        1,
+        r"default of f must be 3 number",
+    ),
+    "number too long": ("def psi(k, a: Pa = (1.0, 2.0)):\n" + PLAIN, 1, "must be 1 number"),
+    "direction of no length": (
+        "def psi(k, f: Direction = (0.0, 0.0, 0.0)):\n" + PLAIN,
+        1,
+        "outside three numbers, not",
+    ),
+    "open and closed": (
+        "def psi(k, a: Pa(above=0.0, maximum=1.0) = 0.5):\n" + PLAIN,
+        1,
+        "bounds of",
+    ),
     "no energy": ("def phi(k: Kinematics):\n    return k.J\n", None, "define psi"),
 }
 
@@ -83,6 +101,8 @@ COMPUTING = {
     "division by zero": (PSI + "    return young / 0\n", 2, "division by zero"),
     "recursion": (PSI + "    return psi(k, young)\n", 2, "recursion"),
     "power of a tensor": (PSI + "    return young * tr(k.E**2)\n", 2, "cannot be computed"),
+    "in-plane word in a solid": (PSI + "    return young * (k.I1_s - 3)\n", 1,
+                                 "k.I1_s is of a membrane's plane; use it in psi_surface"),
     "no stiffness": (PSI + "    return 0 * young\n", 1, "no finite stiffness"),
     "not a number": (PSI + "    return young * ln(-k.J)\n", 1, "no finite stiffness"),
 }  # fmt: skip
@@ -140,6 +160,39 @@ def test_a_file_without_docstring_or_of_no_text_is_refused(tmp_path):
     (tmp_path / "folder.py").mkdir()
     with pytest.raises(supple.MaterialError, match="cannot be read"):
         supple.material(tmp_path / "folder.py")
+
+
+SKIN = "def psi_surface(k: Kinematics, young: Pa = 3e3):\n"
+
+
+@pytest.mark.parametrize(
+    ("energy", "says"),
+    [
+        ("young * (k.I1_s - 2)", "psi_surface has a lateral tension of 6000 Pa at the stretches 1"),
+        ("young * tr(k.E) ** 2 * k.J_s", "psi_surface has a lateral tension"),
+        ("young * (k.I1_s + 1 / k.J_s**2)", "psi_surface at rest is 9000 Pa, not 0; subtract"),
+        ("0 * young", "psi_surface has no finite stiffness at rest"),
+        ("young * k.qr_strain[0, 0]", "k.qr_strain depends on the order of a cell's vertices"),
+    ],
+)
+def test_a_wrong_skin_is_refused_before_it_is_compiled(energy, says, tmp_path):
+    """Tension fields take the width 1/√λ for the one without lateral tension."""
+    path = written(tmp_path, SKIN + f"    return {energy}\n")
+    body = supple.Body(MESH, "neo_hookean").fix(lambda p: p[:, 0] == 0)
+    body.skin(lambda p: p[:, 2] > 0.9, path, thickness=1e-3)
+    with pytest.raises(supple.MaterialError, match=re.escape(says)) as caught:
+        body.solve()
+    sentence(caught, path, 1)
+
+
+def test_an_energy_of_a_skin_alone_makes_no_solid(tmp_path):
+    """Refused when the body is made, or a region; with the remedy."""
+    path = written(tmp_path, SKIN + "    return young * (k.I1_s + 1 / k.J_s**2 - 3)\n")
+    assert supple.material(path).parameters[0].name == "young"
+    body = supple.Body(MESH, "neo_hookean")
+    for make in (lambda: supple.Body(MESH, path), lambda: body.region([0], path)):
+        with pytest.raises(supple.MaterialError, match=r"skin's energy .* give it to body\.skin"):
+            make()
 
 
 def test_declared_exceptions_let_a_law_pass(tmp_path, monkeypatch):

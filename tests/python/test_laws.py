@@ -38,7 +38,7 @@ def test_parameters_of_neo_hookean_are_youngs_and_poissons():
             lambda: supple.material("neo_hokean"),
             "no energy is called neo_hokean; did you mean neo_h",
         ),
-        (lambda: supple.Body(MESH, "zzz"), "there are corotational_polar, .*neo_hookean"),
+        (lambda: supple.Body(MESH, "zzz"), "there are .*corotational_polar, .*neo_hookean"),
         (lambda: supple.Body(MESH, "neo_hookean", yuong=1.0), "yuong; did you mean young"),
         (lambda: supple.Body(MESH, "mooney_rivlin", poisson=0.3), "there are bulk, c1, c2"),
         (lambda: supple.Body(MESH, "neo_hookean", poisson=0.5), r"poisson must lie in \(-1, 0.5\)"),
@@ -78,3 +78,25 @@ def test_values_of_another_shape_are_refused(value):
     with pytest.raises(supple.InputError, match="young must"):
         body.set(young=value)
     assert supple.assemble(body, 0.1 * MESH.points**2)[0] == before
+
+
+def test_directions_reach_the_kernels_at_length_one():
+    """(2, 2, 0) is (1, 1, 0)/√2, for all cells or by cell, as a default too: same energy."""
+    u = MESH.points * [0.2, 0.1, -0.1]
+    unit = np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
+    energies = [
+        supple.assemble(supple.Body(MESH, "transversely_isotropic_mooney_rivlin", fibre=f), u)[0]
+        for f in (unit, (2.0, 2.0, 0.0), np.outer([1e-200, 1.0, 1e200, 2.0, 3.0, 4.0], unit))
+    ]
+    np.testing.assert_allclose(energies, energies[0], rtol=1e-14)
+    other = supple.Body(MESH, "transversely_isotropic_mooney_rivlin", fibre=(0, 0, 1))
+    assert supple.assemble(other, u)[0] != pytest.approx(energies[0], rel=1e-3)
+    fibre = supple.material("holzapfel_gasser_ogden").parameters[-2].default
+    assert np.linalg.norm(fibre) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("wrong", [(0, 0, 0), (1.0, np.nan, 0.0), [[1.0, 0, 0]] * 5 + [[0, 0, 0]]])
+def test_a_direction_of_no_length_is_refused(wrong):
+    """One sentence with what was given."""
+    with pytest.raises(supple.MaterialError, match="fibre must be a direction other than"):
+        supple.Body(MESH, "guccione", fibre=wrong)

@@ -10,6 +10,7 @@ import pytest
 from supple.errors import InputError, MeshError
 from supple.kernels.cells import ELEMENTS, FACETS
 from supple.mesh import Mesh, Tag
+from supple.mesh_topology import all_facets
 
 SIZE = np.array([4.0, 1.5, 2.0])
 
@@ -25,10 +26,19 @@ def block(element):
     return Mesh(mesh.points, mesh.cells, element, tags)
 
 
+def loops(mesh, facets):
+    """Which facets are of each kind, and their corners (k, corners, 3)."""
+    for kind in (FACETS[name] for name in mesh.table.facet_elements):
+        rows = (facets >= 0).sum(axis=1) == kind.nodes
+        yield rows, mesh.points[facets[rows, : kind.corners]]
+
+
 def facet_areas(mesh, facets):
     """Area vectors of flat facets by Newell's sum over the corners."""
-    loop = mesh.points[facets[:, : FACETS[mesh.table.facet].corners]]
-    return np.cross(loop, np.roll(loop, -1, axis=1)).sum(axis=1) / 2
+    areas = np.zeros((len(facets), 3))
+    for rows, loop in loops(mesh, facets):
+        areas[rows] = np.cross(loop, np.roll(loop, -1, axis=1)).sum(axis=1) / 2
+    return areas
 
 
 @pytest.fixture(params=ELEMENTS)
@@ -43,17 +53,24 @@ def test_box_has_the_volume_and_extents_of_the_box(mesh):
     assert mesh.size == 4.0
     np.testing.assert_array_equal(mesh.points.min(axis=0), [1.0, -2.0, 0.5])
     np.testing.assert_allclose(mesh.points.max(axis=0), np.add(SIZE, [1.0, -2.0, 0.5]))
-    assert len(mesh.cells) == 24 * (6 if mesh.table.cell.is_simplex else 1)
+    assert len(mesh.cells) == 24 * {"P": 6, "Q": 1, "Pr": 2}[mesh.element.rstrip("12L")]
+    parts = [Mesh(mesh.points[c], [np.arange(len(c))], mesh.element).volume for c in mesh.cells]
+    np.testing.assert_allclose(parts, 12.0 / len(mesh.cells), rtol=1e-12)
 
 
 def test_box_counts_nodes_as_its_grid_does(mesh):
-    """Vertices 5·3·4; edges: three directions, and for tetrahedra face and block diagonals."""
+    """Vertices 5·3·4; edges: three directions, diagonals of faces and blocks; faces; blocks."""
     x, y, z = 4, 2, 3
     vertices = (x + 1) * (y + 1) * (z + 1)
     straight = x * (y + 1) * (z + 1) + (x + 1) * y * (z + 1) + (x + 1) * (y + 1) * z
-    diagonal = x * y * (z + 1) + x * (y + 1) * z + (x + 1) * y * z + x * y * z
-    edges = {"P1": 0, "Q1": 0, "P2": straight + diagonal, "Q2": straight}[mesh.element]
-    assert len(mesh.points) == vertices + edges
+    flat, upright = x * y * (z + 1), x * (y + 1) * z + (x + 1) * y * z
+    others = {
+        "P2": straight + flat + upright + x * y * z,
+        "Q2": straight,
+        "Q2L": straight + flat + upright + x * y * z,
+        "Pr2": straight + flat + upright + x * y * z,  # the last on the diagonal cut of each block
+    }
+    assert len(mesh.points) == vertices + others.get(mesh.element, 0)
 
 
 def test_tetrahedra_go_round_the_diagonal():
@@ -80,11 +97,31 @@ def test_boundary_is_closed_outward_and_has_the_area_of_the_box(mesh):
 def test_divergence_theorem_gives_the_volume(mesh):
     """∮ x·n da / 3 over the boundary's flat facets is the volume."""
     facets = mesh.boundary()
-    centres = mesh.points[facets[:, : FACETS[mesh.table.facet].corners]].mean(axis=1)
+    centres = np.zeros((len(facets), 3))
+    for rows, loop in loops(mesh, facets):
+        centres[rows] = loop.mean(axis=1)
     assert (centres * facet_areas(mesh, facets)).sum() / 3 == pytest.approx(12.0, rel=1e-13)
 
 
-@pytest.mark.parametrize("element", ["P2", "Q2"])
+@pytest.mark.parametrize("element", ["Pr1", "Pr2"])
+def test_triangles_of_prisms_stand_beside_quadrilaterals(element):
+    """Two triangles a block below and above, one quadrilateral a block on the sides; ends in -1."""
+    mesh = block(element)
+    table = mesh.table
+    assert [FACETS[name].corners for name in table.facet_elements] == [3, 4]
+    three, four = (FACETS[name].nodes for name in table.facet_elements)
+    facets = mesh.boundary()
+    filled = (facets >= 0).sum(axis=1)
+    assert (filled == three).sum() == 2 * 2 * 4 * 2
+    assert (filled == four).sum() == 2 * (4 * 3 + 2 * 3)
+    assert (facets[filled == three, three:] == -1).all()
+    top = mesh.boundary(lambda p: p[:, 2] == 2.5)
+    assert len(top) == 2 * 4 * 2
+    np.testing.assert_array_equal(top[:, three:], -1)
+    assert (mesh.boundary(lambda p: p[:, 0] == 1.0) >= 0).all()
+
+
+@pytest.mark.parametrize("element", ["P2", "Q2", "Q2L", "Pr2"])
 def test_curved_cells_have_the_volume_of_their_map(element):
     """x + a y², y, z + b y x: det = 1 everywhere, so the volume stays; degree 2 maps are exact."""
     straight = Mesh.box((2, 2, 2), (1.0, 1.0, 1.0), element)
@@ -98,6 +135,12 @@ def test_quality_of_known_shapes():
     regular = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
     assert Mesh(regular, [[0, 2, 1, 3]], "P1").quality() == pytest.approx(1.0)
     assert Mesh.box((1, 1, 1), (2.0, 2.0, 2.0), "Q1").quality() == pytest.approx(1.0)
+    triangle = np.array([[0, 0, 0], [1, 0, 0], [0.5, 3**0.5 / 2, 0]])
+    prism = np.vstack([triangle, triangle + np.array([0, 0, 1])])
+    assert Mesh(prism, [np.arange(6)], "Pr1").quality() == pytest.approx(1.0)
+    # A prism of height h: 3 (h det)^(2/3) / (2 + h²), det and ‖·‖² of the regular one being 1, 3.
+    low = Mesh(prism * [1, 1, 0.5], [np.arange(6)], "Pr1").quality()
+    assert low == pytest.approx(3 * 0.5 ** (2 / 3) / 2.25)
     corner = ELEMENTS["P1"].points
     # Liu and Joe: 12 (3 V)^(2/3) / Σ l², V = 1/6, three edges of length 1 and three of √2.
     expected = 12 * 0.5 ** (2 / 3) / 9
@@ -116,11 +159,11 @@ def test_nodes_chosen_four_ways_are_the_same(mesh):
 
 def test_facets_of_a_tag_are_turned_outward(mesh):
     """Tagged facets given inside out come back outward; an inner facet is no boundary."""
-    inward = {"T1": [0, 2, 1], "S1": [0, 3, 2, 1]}.get(mesh.table.facet)
-    if inward is None:
-        inward = {"T2": [0, 2, 1, 5, 4, 3], "S2": [0, 3, 2, 1, 7, 6, 5, 4]}[mesh.table.facet]
+    backwards = {3: [0, 2, 1], 4: [0, 3, 2, 1], 6: [0, 2, 1, 5, 4, 3]}
+    backwards |= {8: [0, 3, 2, 1, 7, 6, 5, 4], 9: [0, 3, 2, 1, 7, 6, 5, 4, 8]}
     outside = mesh.boundary(lambda p: p[:, 0] == 1.0)
-    every = mesh.cells[:, mesh.table.facets].reshape(-1, outside.shape[1])
+    inward = backwards[outside.shape[1]]
+    every = all_facets(mesh.cells, mesh.table)
     middle = every[(mesh.points[every, 0] == 2.0).all(axis=1)]
     tags = {"base": Tag("facets", np.vstack([outside[:, inward], middle]))}
     tagged = Mesh(mesh.points, mesh.cells, mesh.element, tags)
@@ -192,7 +235,7 @@ def test_overlapping_cells_are_refused():
         Mesh(points, [[0, 1, 2, 3], [1, 2, 3, 4], [1, 2, 3, 5]], "P1")
 
 
-@pytest.mark.parametrize("element", ["P2", "Q2"])
+@pytest.mark.parametrize("element", ["P2", "Q2", "Q2L", "Pr2"])
 def test_a_midside_node_pulled_too_far_is_an_inverted_cell(element):
     """A midside node past 1/4 of its edge makes det < 0 at the corner (Barsoum's limit)."""
     mesh = Mesh.box((1, 1, 1), (1.0, 1.0, 1.0), element)
@@ -219,7 +262,20 @@ def test_wrong_tags_and_arguments_are_refused():
             Mesh(UNIT, cells, "P1", {"t": tag})
     with pytest.raises(MeshError, match="kind of a tag"):
         Tag("cell", [0])
-    with pytest.raises(MeshError, match="P1, P2, Q1, Q2"):
+    for wrong in ("P2", "Q2", "P1", "x"):
+        with pytest.raises(MeshError, match=r"can be elevated|must be one of"):
+            (block("P2") if wrong == "P2" else block("P1")).elevated(wrong)
+    prism = ELEMENTS["Pr1"].points
+    for rows, says in [
+        ([[0, 2, 1, 3]], "facets of no cell"),
+        ([[0, 2, 1]], r"shape \(n, 4\)"),
+        ([[0, 2, -1, 1]], "must hold 3 or 4 nodes and then -1"),
+        ([[0, 2, -1, -1]], "must hold 3 or 4 nodes"),
+        ([[0, 2, 1, -2]], "outside 0 to 5"),
+    ]:
+        with pytest.raises(MeshError, match=says):
+            Mesh(prism, [np.arange(6)], "Pr1", {"t": Tag("facets", rows)})
+    with pytest.raises(MeshError, match=r"P1, P2, Q1, Q2, Q2L, Pr1, Pr2, got"):
         Mesh(UNIT, cells, "P3")
     for counts, size in [((0, 1, 1), (1, 1, 1)), ((1, 1), (1, 1, 1)), ((1, 1, 1), (1, -1, 1))]:
         with pytest.raises(MeshError):
@@ -240,11 +296,15 @@ def test_moved_keeps_cells_and_tags_and_leaves_the_first_mesh(mesh):
         mesh.moved(mesh.points[:-1])
 
 
-@pytest.mark.parametrize("element", ["P1", "Q1"])
+@pytest.mark.parametrize("element", ["P2", "Q2", "Q2L", "Pr2"])
 def test_elevated_mesh_carries_the_tags_of_the_same_places(element):
     """Tags of degree 1 become those that the geometry gives at degree 2."""
-    ours = block(element).elevated()
-    direct = block(element[0] + "2")
+    low = block(element.rstrip("2L") + "1")
+    ours = low.elevated(element)
+    direct = block(element)
+    assert ours.element == element
+    if element != "Q2L":
+        assert low.elevated().element == element
     np.testing.assert_array_equal(ours.cells, direct.cells)
     for name, tag in direct.tags.items():
         np.testing.assert_array_equal(ours.tags[name].ids, tag.ids)

@@ -25,10 +25,19 @@ def block(element):
     return Mesh(mesh.points, mesh.cells, element, tags)
 
 
+def loops(mesh, facets):
+    """Which facets are of each kind, and their corners (k, corners, 3)."""
+    for kind in (FACETS[name] for name in mesh.table.facet_elements):
+        rows = (facets >= 0).sum(axis=1) == kind.nodes
+        yield rows, mesh.points[facets[rows, : kind.corners]]
+
+
 def facet_areas(mesh, facets):
     """Area vectors of flat facets by Newell's sum over the corners."""
-    loop = mesh.points[facets[:, : FACETS[mesh.table.facet].corners]]
-    return np.cross(loop, np.roll(loop, -1, axis=1)).sum(axis=1) / 2
+    areas = np.zeros((len(facets), 3))
+    for rows, loop in loops(mesh, facets):
+        areas[rows] = np.cross(loop, np.roll(loop, -1, axis=1)).sum(axis=1) / 2
+    return areas
 
 
 @pytest.fixture(params=ELEMENTS)
@@ -79,7 +88,13 @@ def test_common_formats_read_back_to_the_same_mesh(tmp_path, file_format):
     """Written by meshio in mm, read in m, for each element that the format holds."""
     meshio = pytest.importorskip("meshio")
     suffix = {"gmsh22": "msh", "gmsh": "msh", "vtk": "vtk", "abaqus": "inp", "medit": "mesh"}
-    for element in ELEMENTS if file_format in ("gmsh22", "vtk") else ("P1", "Q1"):
+    # meshio writes Gmsh's prism of 18 nodes in its own order: see the test of Gmsh's order below.
+    known = {
+        "gmsh22": [e for e in ELEMENTS if e != "Pr2"],
+        "vtk": ELEMENTS,
+        "medit": ("P1", "Q1", "Pr1"),
+    }
+    for element in known.get(file_format, ("P1", "Q1")):
         mesh = block(element)
         path = tmp_path / f"{element}.{suffix[file_format]}"
         raw = meshio.Mesh(mesh.points * 1e3, [(mesh.table.meshio, mesh.cells)])
@@ -88,6 +103,87 @@ def test_common_formats_read_back_to_the_same_mesh(tmp_path, file_format):
         assert back.element == element
         np.testing.assert_array_equal(back.cells, mesh.cells)
         np.testing.assert_allclose(back.points, mesh.points, rtol=1e-12)
+
+
+#: Gmsh reference manual, "Node ordering": corners that each node after them lies between.
+GMSH_ORDER = {
+    "Q2L": (12, [
+        *[(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7)],
+        *[(5, 6), (6, 7), (0, 1, 2, 3), (0, 1, 4, 5), (0, 3, 4, 7), (1, 2, 5, 6), (2, 3, 6, 7)],
+        *[(4, 5, 6, 7), (0, 1, 2, 3, 4, 5, 6, 7)],
+    ]),
+    "Pr2": (13, [
+        *[(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)],
+        *[(0, 1, 3, 4), (0, 2, 3, 5), (1, 2, 4, 5)],
+    ]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("element", GMSH_ORDER)
+def test_a_file_in_gmshs_own_order_is_read_right(element, tmp_path):
+    """One cell written by hand under x + 0.3 y², y, z + 0.2 x y (det 1): volume 1, or 1/2."""
+    kind, between = GMSH_ORDER[element]
+    corners = ELEMENTS[element].points[: ELEMENTS[element].corners]
+    places = np.vstack([corners, [corners[list(c)].mean(axis=0) for c in between]])
+    x, y, z = places.T
+    points = np.column_stack([x + 0.3 * y**2, y, z + 0.2 * x * y])
+    lines = [f"{i} {p[0]!r} {p[1]!r} {p[2]!r}" for i, p in enumerate(points.tolist(), 1)]
+    cell = " ".join(str(i) for i in range(1, len(points) + 1))
+    path = tmp_path / "g.msh"
+    path.write_text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n"
+        + "\n".join([str(len(points)), *lines])
+        + f"\n$EndNodes\n$Elements\n1\n1 {kind} 2 1 1 {cell}\n$EndElements\n"
+    )
+    mesh = Mesh.read(path, unit="m")
+    assert mesh.element == element
+    assert mesh.volume == pytest.approx(1.0 if element == "Q2L" else 0.5, rel=1e-13)
+    back = mesh.points[mesh.cells[0]]
+    ours = ELEMENTS[element].points
+    np.testing.assert_allclose(back[:, 1], ours[:, 1], atol=1e-15)
+    np.testing.assert_allclose(back[:, 0], ours[:, 0] + 0.3 * ours[:, 1] ** 2, atol=1e-15)
+
+
+#: Parametric coordinates of vtkWedge (type 13), vtkBiQuadraticQuadraticWedge (32) and
+#: vtkTriQuadraticHexahedron (29); the first turns the other way round than the second.
+VTK_CELLS = {
+    "Pr1": (13, [(0, 0, 0), (0, 1, 0), (1, 0, 0), (0, 0, 1), (0, 1, 1), (1, 0, 1)]),
+    "Pr2": (32, [
+        *[(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)],
+        *[(0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0.5, 0, 1), (0.5, 0.5, 1), (0, 0.5, 1)],
+        *[(0, 0, 0.5), (1, 0, 0.5), (0, 1, 0.5), (0.5, 0, 0.5), (0.5, 0.5, 0.5), (0, 0.5, 0.5)],
+    ]),
+    "Q2L": (29, [
+        *[(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)],
+        *[(0.5, 0, 0), (1, 0.5, 0), (0.5, 1, 0), (0, 0.5, 0)],
+        *[(0.5, 0, 1), (1, 0.5, 1), (0.5, 1, 1), (0, 0.5, 1)],
+        *[(0, 0, 0.5), (1, 0, 0.5), (1, 1, 0.5), (0, 1, 0.5)],
+        *[(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0)],
+        *[(0.5, 0.5, 1), (0.5, 0.5, 0.5)],
+    ]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("element", VTK_CELLS)
+def test_a_file_in_vtks_own_order_is_read_right_and_written_so(element, tmp_path):
+    """One cell at VTK's parametric coordinates, by hand: volume 1/2 or 1; our VTU says the same."""
+    kind, places = VTK_CELLS[element]
+    count = len(places)
+    path = tmp_path / "v.vtk"
+    path.write_text(
+        "# vtk DataFile Version 3.0\nby hand\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+        + f"POINTS {count} double\n"
+        + "\n".join(" ".join(map(str, p)) for p in places)
+        + f"\nCELLS 1 {count + 1}\n{count} {' '.join(map(str, range(count)))}\n"
+        + f"CELL_TYPES 1\n{kind}\n"
+    )
+    mesh = Mesh.read(path, unit="m")
+    assert mesh.element == element
+    assert mesh.volume == pytest.approx(1.0 if element == "Q2L" else 0.5, rel=1e-14)
+    np.testing.assert_array_equal(mesh.points[mesh.cells[0]], ELEMENTS[element].points)
+    text = mesh.write(tmp_path / "v.vtu").read_text(encoding="utf-8")
+    assert "binary" in text  # so look at what meshio's writer is handed by its reader's inverse
+    np.testing.assert_array_equal(Mesh.read(tmp_path / "v.vtu").cells, mesh.cells)
 
 
 GMSH22 = """$MeshFormat
@@ -176,6 +272,22 @@ def test_gmsh1_is_read_with_sparse_node_numbers(tmp_path):
     assert mesh.volume == pytest.approx(1e-6 / 6)
     assert mesh.tags["5"].ids.tolist() == [[0, 2, 1]]
     assert mesh.tags["9"].kind == "cells"
+
+
+def test_gmsh1_knows_prisms(tmp_path):
+    """Gmsh's type 6: volume 1/2, the triangle below tagged 5 and a side tagged 6, a row each."""
+    nodes = "".join(f"{i} {p[0]} {p[1]} {p[2]}\n" for i, p in enumerate(ELEMENTS["Pr1"].points))
+    path = tmp_path / "m.msh"
+    path.write_text(
+        f"$NOD\n6\n{nodes}$ENDNOD\n$ELM\n3\n1 2 5 5 3 0 2 1\n2 3 6 6 4 0 1 4 3\n"
+        "3 6 9 9 6 0 1 2 3 4 5\n$ENDELM\n"
+    )
+    mesh = Mesh.read(path, unit="m")
+    assert (mesh.element, mesh.volume) == ("Pr1", pytest.approx(0.5))
+    assert mesh.tags["5"].ids.tolist() == [[0, 2, 1, -1]]
+    assert mesh.tags["6"].ids.tolist() == [[0, 1, 4, 3]]
+    assert facet_areas(mesh, mesh.boundary("5")).tolist() == [[0, 0, -0.5]]
+    assert mesh.nodes("5").tolist() == [0, 1, 2]
 
 
 @pytest.mark.parametrize(

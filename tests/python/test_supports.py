@@ -84,7 +84,7 @@ def test_shares_of_a_region_sum_to_one_and_follow_area(element):
     share = node_shares(mesh, nodes)
     assert share.sum() == pytest.approx(1.0)
     assert (share > 0).all()
-    if element == "Q1":
+    if element in ("Q1", "Pr1"):
         middle = np.all(mesh.points[nodes] == [0.5, 0.5, 0], axis=1)
         assert share[middle] == pytest.approx(0.25)
 

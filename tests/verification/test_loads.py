@@ -27,7 +27,7 @@ def loads_only(mesh):
 
 def facet_area(mesh, points):
     """Area of the flat side x = 1 of ``mesh`` where its points are ``points``, by triangles."""
-    facets = mesh.boundary(lambda p: p[:, 0] > 1 - 1e-9)
+    facets = mesh.boundary(lambda p: p[:, 0] > 1 - 1e-9)  # of prisms, quadrilaterals
     corners = points[facets[:, : 3 if mesh.table.cell.is_simplex else 4]]
     fan = [(0, 1, 2)] if mesh.table.cell.is_simplex else [(0, 1, 2), (0, 2, 3)]
     return sum(
@@ -128,3 +128,40 @@ def test_everything_on_the_loaded_shape_is_the_direct_problem_read_backwards(ele
     system = body.on(rest.moved(rest.points + u))._system(True).system
     inverse = system.residual(-u.ravel(), 1.0).reshape(-1, 3)
     np.testing.assert_allclose(inverse, direct, atol=1e-11 * abs(direct).max(), rtol=0)
+
+
+@pytest.mark.parametrize("element", ["Pr1", "Pr2"])
+def test_skin_values_of_prisms_follow_their_facets(element):
+    """Thickness and modulus one a facet, triangles and quadrilaterals mixed: energies add up."""
+    mesh = supple.Mesh.box((2, 1, 1), (1.0, 0.8, 0.5), element)
+    u = mesh.points @ np.diag([0.3, 0.2, 0.25])
+    every = mesh.boundary()
+    count = len(every)
+    thickness, young = np.linspace(1e-3, 4e-3, count), np.linspace(5e3, 1e3, count)
+
+    def energy(where, **values):
+        body = supple.Body(mesh, "neo_hookean", young=1e-12, poisson=0.3)
+        return supple.assemble(body.skin(where, "neo_hookean", **values), u)[0]
+
+    alone = []
+    for row, h, modulus in zip(every, thickness, young, strict=True):
+        tagged = supple.Mesh(
+            mesh.points, mesh.cells, element, {"one": supple.Tag("facets", row[None])}
+        )
+        body = supple.Body(tagged, "neo_hookean", young=1e-12, poisson=0.3)
+        body.skin("one", "neo_hookean", thickness=h, young=modulus)
+        alone.append(supple.assemble(body, u)[0])
+    found = energy(everywhere, thickness=thickness, young=young)
+    assert found == pytest.approx(sum(alone), rel=1e-12)
+    assert abs(energy(everywhere, thickness=thickness[::-1], young=young) / found - 1) > 1e-3
+
+
+@pytest.mark.parametrize("element", ["Pr1", "Pr2"])
+def test_traction_on_the_ends_of_prisms_sums_to_triangles_and_quadrilaterals(element):
+    """Sides x = 1 (quadrilaterals) and z = 0.5 (triangles) in one load: both areas count once."""
+    t = np.array([3.0, -4.0, 5.0])
+    mesh = supple.Mesh.box((2, 1, 1), (1.0, 0.8, 0.5), element)
+    nodes = (mesh.points[:, 0] > 1 - 1e-9) | (mesh.points[:, 2] > 0.5 - 1e-9)
+    assert len(np.unique((mesh.boundary(nodes) >= 0).sum(axis=1))) == 2
+    force = supple.assemble(loads_only(mesh).traction(nodes, t), np.zeros_like(mesh.points))[1]
+    np.testing.assert_allclose(-force.sum(axis=0), t * (0.8 * 0.5 + 0.8), rtol=1e-12)

@@ -6,15 +6,15 @@
  * (kernels/generate.py) and the reader (cpp/src/library.cpp) with it.
  *
  * Lanes: a call treats W cells at once and every array is laid out [entry][lane]; W = 1 is a plain
- * cell. With m nodes a cell and node-major dofs (3a + i):
- *     A  (rows × cols)[W]  the kernel ADDS to it; rows, cols = 3m for matrices, 1 where absent
+ * cell. With m nodes a cell, node-major dofs (3a + i), then s scalars (pressures), d = 3m + s:
+ *     A  (rows × cols)[W]  the kernel ADDS to it; 1 where absent
  *     w  (sum of field sizes)[W]  the fields that the kernel names, one after another
  *     x  (3m)[W]  coordinates of the mesh's nodes, m
  */
 #ifndef SUPPLE_KERNEL_H
 #define SUPPLE_KERNEL_H
 
-#define SUPPLE_KERNEL_ABI 1
+#define SUPPLE_KERNEL_ABI 2
 
 #ifdef __cplusplus
 extern "C" {
@@ -22,14 +22,14 @@ extern "C" {
 
 typedef void (*supple_tabulate)(double* A, const double* w, const double* x);
 
-/* A coefficient: displacement "u" has size 3m, a parameter or a direction its number of entries. */
+/* A coefficient: the unknowns "u" have size d, a parameter or a direction its number of entries. */
 typedef struct supple_field {
   const char* name;
   int size;
 } supple_field;
 
 typedef struct supple_kernel {
-  const char* name; /* energy, residual, tangent, volume_ratio, points */
+  const char* name; /* energy, residual (d), tangent (d × d), volume_ratio, points, d_<field> */
   int rows;         /* of A */
   int cols;
   int field_count;
@@ -41,12 +41,15 @@ typedef struct supple_library {
   int abi;             /* SUPPLE_KERNEL_ABI */
   const char* unit;    /* such as neo_hookean.P1.direct */
   const char* hash;    /* of the energy file; "" where there is none */
-  const char* element; /* P1, P2, Q1, Q2, T1, T2, S1, S2 */
+  const char* element; /* P1, P2, Q1, …; of a facet T1, S1, … */
   int nodes;           /* m */
+  int scalars;         /* s */
   int lanes;           /* W */
   int degree;          /* of the quadrature */
   int point_count;
-  const double* weights; /* (point_count) on the reference cell */
+  int dimension;         /* of the reference cell */
+  const double* points;  /* (point_count, dimension) on the reference cell */
+  const double* weights; /* (point_count) */
   int field_count;
   const supple_field* fields;
   int kernel_count;

@@ -13,10 +13,16 @@ namespace supple {
 class KernelTerm final : public Term {
  public:
   /// @param points (3n) coordinates of the mesh that the kernels live on, m, node-major.
-  /// @param cells (cells, m) in kernel node order.
-  /// @throws ShapeError if the element has another number of nodes, or a node is outside [0, n).
+  /// @param cells (cells, m + s) nodes in kernel order, then the cell's scalars as n + number.
+  /// @param scalars how many there are in all.
+  /// @throws ShapeError if the kernels have another number of nodes or scalars, or a number is out
+  /// of range.
   KernelTerm(std::shared_ptr<const KernelLibrary> library, std::shared_ptr<const Vector> points,
-             Connectivity cells);
+             Connectivity cells, Index scalars = 0);
+
+  /// The unit of the scalar unknowns, Pa/m: a pressure is this times its unknown, so that unknowns
+  /// are metres and residuals newtons throughout.
+  void set_scalar_unit(double unit) { scalar_unit_ = unit; }
 
   /// Values of a per-cell field, (cells · size) cell-major.
   /// @throws ShapeError for an unknown field or a wrong size.
@@ -40,6 +46,11 @@ class KernelTerm final : public Term {
  private:
   struct Buffers;
   void require_fields() const;
+  /// Dof of entry `i` of the kernel's vectors, for the cell whose row of cells_ begins at `node`.
+  Index dof(const Index* node, Index i) const {
+    return i < 3 * nodes_ ? 3 * node[i / 3] + i % 3 : node[i - 2 * nodes_] + scalar_offset_;
+  }
+  double unit(Index i) const { return i < 3 * nodes_ ? 1.0 : scalar_unit_; }
   void add_residual(const ConstVector& u, double scale, MutableVector r) const;
   /// The residual of a load that does not depend on u (3n); computed once for the fields' values.
   const Vector& constant() const;
@@ -53,11 +64,14 @@ class KernelTerm final : public Term {
   std::shared_ptr<const KernelLibrary> library_;
   std::shared_ptr<const Vector> points_;
   Connectivity cells_;
-  Index group_ = 1; // cells of a batch of colouring_
+  Index nodes_, scalars_;    // of a cell
+  Index scalar_offset_;      // from a scalar's number in cells_ to its dof
+  double scalar_unit_ = 1.0; // Pa/m
+  Index group_ = 1;          // cells of a batch of colouring_
   Colouring colouring_;
   std::vector<Vector> fields_; // by field number; "u" stays empty
   mutable Vector constant_;
-  const supple_kernel *energy_, *residual_, *tangent_, *volume_ratio_;
+  const supple_kernel *energy_, *tangent_, *volume_ratio_;
 };
 
 } // namespace supple

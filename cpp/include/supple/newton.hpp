@@ -50,20 +50,20 @@ enum class Outcome {
 
 struct NewtonResult {
   Outcome outcome = Outcome::Converged;
-  Vector u;                 ///< (3n) at the last equilibrium found
+  Vector u;                 ///< (dofs) at the last equilibrium found
   double load_factor = 0.0; ///< of that equilibrium
-  Vector residual;          ///< (3n) at u with the whole load; reactions at fixed dofs
+  Vector residual;          ///< (dofs) at u with the whole load; reactions at fixed dofs
   std::vector<Iteration> history;
   VolumeRatio worst;         ///< smallest volume ratio met in the last attempt
-  Vector last_residual;      ///< (3n) of the last attempt, to find the cells at fault
+  Vector last_residual;      ///< (dofs) of the last attempt, to find the cells at fault
   std::int64_t negative = 0; ///< negative eigenvalues, where the outcome is Unstable
 };
 
 /// Called after each iteration; may throw to stop the solve.
 using Progress = std::function<void(const Iteration&)>;
 
-/// Find equilibrium from `start` (3n) with the fixed dofs brought to `prescribed` (3n; free entries
-/// are not read).
+/// Find equilibrium from `start` (dofs) with the fixed dofs brought to `prescribed` (3n; free
+/// entries are not read).
 /// @throws ShapeError on sizes; whatever `progress` throws.
 NewtonResult solve(System& system, const Vector& start, const Vector& prescribed,
                    const NewtonSettings& settings, const Progress& progress);

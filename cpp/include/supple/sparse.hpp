@@ -1,9 +1,10 @@
 /// Sparsity of a mesh: node graph, CSR pattern, scatter maps, reduction to free dofs, colours.
 ///
-/// Conventions: a node has three dofs, node-major (dof 3a + i is direction i of node a). The global
-/// matrix is CSR, unsymmetric pattern in general, columns ascending; its three rows of node a lie
-/// one after the other and have equal length, so block (a, b) starts at one position and its next
-/// row is `row_stride` further on.
+/// Conventions: a node has three dofs, node-major (dof 3a + i is direction i of node a). After the
+/// n nodes come the scalars, such as the pressures of a mixed form: scalar s is node n + s of a
+/// connectivity and has the one dof 3n + s. The global matrix is CSR, unsymmetric pattern in
+/// general, columns ascending; its three rows of node a lie one after the other and have equal
+/// length, so block (a, b) starts at one position and its next row is `row_stride` further on.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,7 @@
 namespace supple {
 
 using Index = std::int32_t;
-/// (cells, nodes per cell) node numbers of each cell.
+/// (cells, nodes per cell) node numbers of each cell, its scalars last.
 using Connectivity = Eigen::Matrix<Index, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 /// (dofs) true where the dof is free.
 using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
@@ -25,23 +26,27 @@ using MutableVector = Eigen::Ref<Eigen::VectorXd>;
 /// Where the cell matrices of one connectivity go in the global CSR values.
 struct Scatter {
   Index cells = 0;
-  Index nodes_per_cell = 0;      ///< m
-  std::vector<Index> position;   ///< (cells, m, m) first entry of block (a, b)
-  std::vector<Index> row_stride; ///< (cells, m) from one row of local node a to its next row
+  Index nodes_per_cell = 0;      ///< m with three dofs
+  Index scalars_per_cell = 0;    ///< s with one, behind them
+  std::vector<Index> position;   ///< (cells, m + s, m + s) first entry of block (a, b)
+  std::vector<Index> row_stride; ///< (cells, m + s) from one row of local node a to its next row
 };
 
 /// Node graph of a mesh and the CSR pattern of its stiffness matrix.
 struct BlockPattern {
   Index nodes = 0;
-  std::vector<Index> node_start; ///< (nodes + 1) offsets into `neighbour`
+  std::vector<Index> home;       ///< (scalars) the node whose neighbours a scalar shares
+  std::vector<Index> node_start; ///< (nodes + scalars + 1) offsets into `neighbour`
   std::vector<Index> neighbour;  ///< nodes that share a cell with a node, itself too, ascending
-  std::vector<Index> row_start;  ///< (3 nodes + 1) CSR offsets
+  std::vector<Index> row_start;  ///< (dofs + 1) CSR offsets
   std::vector<Index> column;     ///< (nonzeros) CSR columns
   std::vector<Scatter> scatter;  ///< one for each connectivity, in the order given
 
-  Index dofs() const { return 3 * nodes; }
+  Index scalars() const { return static_cast<Index>(home.size()); }
+  Index dofs() const { return 3 * nodes + scalars(); }
+  Index first_dof(Index a) const { return a < nodes ? 3 * a : a + 2 * nodes; }
   Index nonzeros() const { return static_cast<Index>(column.size()); }
-  /// From one row of node `a` to its next row: 3 × the number of its neighbours.
+  /// From one row of node `a` to its next row: the length of its rows.
   Index row_stride(Index a) const;
   /// First entry of block (a, b) in the CSR values, −1 if the nodes share no cell.
   Index position(Index a, Index b) const;
@@ -50,28 +55,34 @@ struct BlockPattern {
 /// Pattern of a mesh with `nodes` nodes, and the scatter map of each connectivity.
 ///
 /// A node without cells keeps its diagonal block. Cost O(cells m² log).
-/// @throws ShapeError if a cell names a node outside [0, nodes) or the matrix exceeds 2³¹ entries.
-BlockPattern block_pattern(Index nodes, const std::vector<Connectivity>& connectivities);
+/// @param home (scalars) the node whose neighbours each scalar shares; empty where there are none.
+/// @throws ShapeError if a cell names a node outside [0, nodes + scalars), has a scalar before a
+/// node, or the matrix exceeds 2³¹ entries.
+BlockPattern block_pattern(Index nodes, const std::vector<Connectivity>& connectivities,
+                           std::vector<Index> home = {});
 
-/// values += cell matrix: entry (r, c) of the (3m × 3m) row-major matrix is `matrix[(r·3m +
-/// c)·step]`.
+/// values += cell matrix: entry (r, c) of the row-major (d × d) matrix, d = 3m + s, is
+/// `matrix[(r·d + c)·step]`.
 ///
 /// `step` is 1 for one cell, the number of lanes for cells in lanes. Neither allocates nor locks:
 /// cells that share a node must not be scattered at once (see colour_cells).
 inline void scatter_add(const Scatter& map, Index cell, const double* matrix, double* values,
                         std::ptrdiff_t step = 1) {
   const auto m = static_cast<std::ptrdiff_t>(map.nodes_per_cell);
-  const Index* position = map.position.data() + cell * m * m;
-  const Index* row_stride = map.row_stride.data() + cell * m;
-  for (std::ptrdiff_t a = 0; a < m; ++a) {
-    for (std::ptrdiff_t i = 0; i < 3; ++i) {
-      const double* row = matrix + (3 * a + i) * 3 * m * step;
+  const std::ptrdiff_t all = m + map.scalars_per_cell, d = 2 * m + all;
+  const Index* position = map.position.data() + cell * all * all;
+  const Index* row_stride = map.row_stride.data() + cell * all;
+  const double* row = matrix;
+  for (std::ptrdiff_t a = 0; a < all; ++a) {
+    for (std::ptrdiff_t i = 0; i < (a < m ? 3 : 1); ++i, row += d * step) {
       double* target = values + i * row_stride[a];
       for (std::ptrdiff_t b = 0; b < m; ++b) {
-        double* block = target + position[a * m + b];
+        double* block = target + position[a * all + b];
         for (std::ptrdiff_t j = 0; j < 3; ++j)
           block[j] += row[(3 * b + j) * step];
       }
+      for (std::ptrdiff_t b = m; b < all; ++b)
+        target[position[a * all + b]] += row[(2 * m + b) * step];
     }
   }
 }

@@ -17,26 +17,30 @@ struct Timings {
 class System {
  public:
   /// @param points (3n) coordinates of the mesh, m, node-major.
-  explicit System(std::shared_ptr<const Vector> points) : points_(std::move(points)) {}
+  /// @param home (scalars) the node whose neighbours each scalar unknown shares.
+  explicit System(std::shared_ptr<const Vector> points, std::vector<Index> home = {})
+      : points_(std::move(points)), home_(std::move(home)) {}
 
   /// Add a term; the pattern is made anew at the next use.
   void add(std::shared_ptr<Term> term);
-  /// Which dofs are free (3n); the reduction and the symbolic factor are made anew if it changes.
+  /// Which dofs are free; the reduction and the symbolic factor are made anew if it changes.
   /// @throws ShapeError on a wrong size.
   void set_free(Mask free);
 
-  Index dofs() const { return static_cast<Index>(points_->size()); }
+  Index scalars() const { return static_cast<Index>(home_.size()); }
+  Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
   const std::shared_ptr<const Vector>& points() const { return points_; }
   /// All terms have a potential, so energy() is that of residual().
   bool has_energy() const;
-  /// By the origin of the terms: Cholesky where all are symmetric, else Unsymmetric.
+  /// By the origin of the terms: Unsymmetric where one is, QuasiDefinite with scalars, else
+  /// Cholesky.
   Kind kind() const;
 
   /// Potential energy, loads scaled by `load_factor`, J.
   double energy(const ConstVector& u, double load_factor) const;
-  /// R (3n), N, loads scaled.
+  /// R (dofs), N, loads scaled.
   Vector residual(const ConstVector& u, double load_factor) const;
-  /// External force alone, −R of the loads at factor 1 (3n), N.
+  /// External force alone, −R of the loads at factor 1 (dofs), N.
   Vector external(const ConstVector& u) const;
   VolumeRatio volume_ratio(const ConstVector& u) const;
 
@@ -49,17 +53,19 @@ class System {
   FactorStatus factorise(double shift = 0.0);
   /// The same without asking it to be positive definite (symmetric kinds only).
   FactorStatus factorise_indefinite();
-  /// x (3n), 0 at fixed dofs, from the last factor; `rhs` (3n).
+  /// x (dofs), 0 at fixed ones, from the last factor; `rhs` (dofs).
   Vector solve(const ConstVector& rhs);
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
-  /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only).
+  /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only); of a
+  /// quasi-definite one those of its last factor.
   Inertia inertia();
 
   Timings timings;
 
  private:
   std::shared_ptr<const Vector> points_;
+  std::vector<Index> home_;
   std::vector<std::shared_ptr<Term>> terms_;
   Mask free_;
   std::unique_ptr<BlockPattern> pattern_;

@@ -15,7 +15,7 @@ struct VolumeRatio {
   Index term = -1; ///< of the system, in the order of System::add
 };
 
-/// What a term does with u, node-major displacements of all nodes (3n).
+/// What a term does with u: node-major displacements of all nodes (3n), then the scalars.
 ///
 /// Signs: residual = internal − external force. Thread counts do not change a result: sums run over
 /// batches of cells in a fixed order.
@@ -23,7 +23,7 @@ class Term {
  public:
   virtual ~Term() = default;
 
-  /// (cells, nodes per cell) nodes whose dofs this term couples; has no rows for a constant term.
+  /// (cells, nodes per cell) nodes, then scalars, that this term couples; no rows where constant.
   virtual const Connectivity& cells() const = 0;
   /// Whether energy() is the potential of residual().
   virtual bool has_energy() const = 0;
@@ -52,9 +52,11 @@ class NodalForce final : public Term {
   const Connectivity& cells() const override { return cells_; }
   bool has_energy() const override { return true; }
   bool symmetric() const override { return true; }
-  double energy(const ConstVector& u) const override { return -forces_.dot(u); }
+  double energy(const ConstVector& u) const override {
+    return -forces_.dot(u.head(forces_.size()));
+  }
   void residual(const ConstVector&, double scale, MutableVector r) const override {
-    r -= scale * forces_;
+    r.head(forces_.size()) -= scale * forces_;
   }
   void tangent(const ConstVector&, double, const Scatter&, MutableVector) const override {}
   VolumeRatio volume_ratio(const ConstVector&) const override { return {}; }

@@ -1,0 +1,4 @@
+"""What a material author needs: a law's curves, its properties, and its fit to tests.
+
+    energy file ─► points (compiled kernels) ─► modes (tests on a cube) ─► curves, properties, fit
+"""
