@@ -20,7 +20,7 @@ from ffcx.formatting import format_code
 from ffcx.ir.representation import compute_ir
 from ffcx.options import FFCX_DEFAULT_OPTIONS
 
-from . import checks, elements, functions, reader
+from . import checks, elements, fingerprint, functions, reader
 from .forms import (
     loads,
     manufactured,
@@ -121,7 +121,7 @@ def source(unit: Unit, contract: str) -> str:
             f'{{"{k.name}", {k.rows}, {k.cols}, {len(k.fields)}, fields_{k.name}, {k.name}}}'
             for k in kernels
         ),
-        unit=unit.name, hash=law_hash, element=unit.element,
+        unit=unit.name, hash=fingerprint.mark(law_hash), element=unit.element,
         nodes=elements.scalar_element(unit.element).dim, scalars=forms.scalars, lanes=LANES,
         degree=forms.degree, point_count=len(weights), dimension=places.shape[1],
         field_count=len(names), kernel_count=len(kernels),
