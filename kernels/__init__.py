@@ -13,9 +13,12 @@
     elements    Basix elements and the pinned quadrature
     forms/      weak forms: volume, loads, membrane
     unit        the name of one kernel library, such as neo_hookean.P1.direct
+    parts       a long kernel as several functions
+    fingerprint the mark by which a library is known to be of this generator
     generate    unit → C source with its kernel table
     build       C source → shared library, kept in the user's cache
+    ahead       the units that CMake compiles
 
-Only `reader`, `unit`, `cells`, `degree` and `build` are needed to find a library that exists: they
-import neither UFL nor FFCx.
+Only `reader`, `unit`, `cells`, `degree`, `fingerprint` and `build` are needed to find a library that
+exists: they import neither UFL nor FFCx.
 """

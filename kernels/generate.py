@@ -20,7 +20,7 @@ from ffcx.formatting import format_code
 from ffcx.ir.representation import compute_ir
 from ffcx.options import FFCX_DEFAULT_OPTIONS
 
-from . import checks, elements, functions, reader
+from . import checks, elements, fingerprint, functions, reader
 from .forms import (
     loads,
     manufactured,
@@ -32,6 +32,7 @@ from .forms import (
     volume,
 )
 from .forms.common import Forms
+from .parts import in_parts
 from .unit import SENSITIVITY, Unit
 
 LANES = 1
@@ -120,7 +121,7 @@ def source(unit: Unit, contract: str) -> str:
             f'{{"{k.name}", {k.rows}, {k.cols}, {len(k.fields)}, fields_{k.name}, {k.name}}}'
             for k in kernels
         ),
-        unit=unit.name, hash=law_hash, element=unit.element,
+        unit=unit.name, hash=fingerprint.mark(law_hash), element=unit.element,
         nodes=elements.scalar_element(unit.element).dim, scalars=forms.scalars, lanes=LANES,
         degree=forms.degree, point_count=len(weights), dimension=places.shape[1],
         field_count=len(names), kernel_count=len(kernels),
@@ -217,4 +218,5 @@ def _function(name: str, text: str) -> str:
     for line, word in re.findall(r"^(static const double (\w+)\[.*;\n)", body, re.MULTILINE):
         if len(re.findall(rf"\b{word}\b", body)) == 1:
             body = body.replace(line, "")
-    return f"static void {name}({_ARGUMENTS})\n{body}\n}}\n"
+    parts, body = in_parts(name, body)
+    return f"{parts}static void {name}({_ARGUMENTS})\n{body}\n}}\n"

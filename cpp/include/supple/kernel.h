@@ -40,7 +40,7 @@ typedef struct supple_kernel {
 typedef struct supple_library {
   int abi;             /* SUPPLE_KERNEL_ABI */
   const char* unit;    /* such as neo_hookean.P1.direct */
-  const char* hash;    /* of the energy file; "" where there is none */
+  const char* hash;    /* of the energy file, if any, and of the generator */
   const char* element; /* P1, P2, Q1, …; of a facet T1, S1, … */
   int nodes;           /* m */
   int scalars;         /* s */
