@@ -91,7 +91,7 @@ class PointLaw:
         if count not in self._terms:
             points = np.tile(_CELL, (count, 1)).ravel()
             cells = np.arange(4 * count, dtype=np.int32).reshape(count, 4)
-            system = core().System(points)
+            system = core().System(points, [])
             self._terms[count] = core().KernelTerm(self._library, system, cells)
         term = self._terms[count]
         for name, rows in self._rows.items():
