@@ -46,37 +46,13 @@ class Space:
 
 
 @dataclass(frozen=True)
-class MixedSpace:
-    """Displacement on an isoparametric element with a continuous pressure of one degree less."""
+class MixedSpace(Space):
+    """The same with a continuous pressure of one degree less; ``trial`` is that of all unknowns."""
 
-    name: str
-    mesh: Any
     unknown: Any  # displacement, then the pressures of the corners
-    test_all: Any
-    trial: Any
+    pressure: Any
+    pressure_test: Any
     pressures: int  # of a cell
-
-    @property
-    def displacement(self) -> Any:
-        """u of the unknown."""
-        return ufl.split(self.unknown)[0]
-
-    @property
-    def pressure(self) -> Any:
-        """p of the unknown."""
-        return ufl.split(self.unknown)[1]
-
-    @property
-    def test(self) -> Any:
-        """Displacement's part of the test function."""
-        return ufl.split(self.test_all)[0]
-
-    @property
-    def pressure_test(self) -> Any:
-        """Pressure's part of the test function."""
-        return ufl.split(self.test_all)[1]
-
-    field = Space.field
 
 
 @cache
@@ -102,8 +78,9 @@ def mixed_space(name: str) -> MixedSpace:
     mesh = ufl.Mesh(element)
     pressure = basix.ufl.element("P", TABLES[name].cell.name, 1)
     V = ufl.FunctionSpace(mesh, basix.ufl.mixed_element([element, pressure]))
-    unknowns = ufl.Coefficient(V), ufl.TestFunction(V), ufl.TrialFunction(V)
-    return MixedSpace(name, mesh, *unknowns, pressure.dim)
+    unknown, test = ufl.Coefficient(V), ufl.TestFunction(V)
+    (u, p), (v, q) = ufl.split(unknown), ufl.split(test)
+    return MixedSpace(name, mesh, u, v, ufl.TrialFunction(V), unknown, p, q, pressure.dim)
 
 
 @cache

@@ -141,10 +141,16 @@ def lame(young: Any, poisson: Any) -> tuple[Any, Any]:
 class Volumetric:
     """A volumetric energy U(J) with the pair of its mixed form psi_dev + p g(J) - U*(p).
 
+    The helpers take g(J) = J - 1, so that p is the pressure, positive in tension. Thesis eq. 38 has
+    g(J) = ln J, the same in the limit of fine meshes. On a mesh J is g's constraint only in the
+    mean, and p g''(J) < 0 rewards every J that strays from it: in tension near the shear modulus
+    Taylor-Hood cells then fold up instead of stretching (a clamped cube at stretch 2: 26 % too
+    soft). J - 1 neither rewards nor resists.
+
     Attributes:
         U: energy, Pa.
         g: constraint g(J), 1: the multiplier p gives the stress p g'(J).
-        conjugate: U*(p), Pa, of ``p`` in Pa.
+        conjugate: U*(p) = max over J of p g(J) - U(J), Pa, of ``p`` in Pa.
     """
 
     U: Any
@@ -153,8 +159,13 @@ class Volumetric:
 
 
 def log_volumetric(J: Any, bulk: Any) -> Volumetric:
-    """bulk/2 ln(J)²."""
-    return Volumetric(bulk / 2 * ln(J) ** 2, ln(J), lambda p: p**2 / (2 * bulk))
+    """bulk/2 ln(J)²; its pressure bulk ln(J)/J is at most bulk/e, reached at J = e."""
+
+    def conjugate(p: Any) -> Any:
+        s = _log_stretch(p / bulk)
+        return p * (exp(s) - 1) - bulk / 2 * s**2
+
+    return Volumetric(bulk / 2 * ln(J) ** 2, J - 1, conjugate)
 
 
 def quadratic_volumetric(J: Any, bulk: Any) -> Volumetric:
@@ -165,8 +176,24 @@ def quadratic_volumetric(J: Any, bulk: Any) -> Volumetric:
 def ogden_volumetric(J: Any, bulk: Any) -> Volumetric:
     """bulk/4 (J² - 1 - 2 ln J); Mazier 2022, eq. 70."""
 
-    # With s = ln J: U*(p) = max over s of p s - U(e^s), reached where e^(2s) = 1 + 2 p / bulk.
     def conjugate(p: Any) -> Any:
-        return (p / 2 + bulk / 4) * ln(1 + 2 * p / bulk) - p / 2
+        # Its pressure is bulk/2 (J - 1/J), so J² = 1 + 2 x J with x = p/bulk.
+        x = p / bulk
+        ratio = x + sqrt(1 + x**2)
+        return p * (ratio / 2 - 1) + bulk / 2 * ln(ratio)
 
-    return Volumetric(bulk / 4 * (J**2 - 1 - 2 * ln(J)), ln(J), conjugate)
+    return Volumetric(bulk / 4 * (J**2 - 1 - 2 * ln(J)), J - 1, conjugate)
+
+
+def _log_stretch(a: Any) -> Any:
+    """The root s <= 1 of s = a exp(s), -W(-a) of Lambert's function; NaN past a = 1/e.
+
+    A start that is right at a = 0 and 1/e and to 2 % between (the root's series in r, Corless et
+    al. 1996, eq. 4.22), then two Newton steps.
+    """
+    r = sqrt(1 - math.e * a)
+    s = 1 - ln(1 + math.sqrt(2) * r + (math.e - 1 - math.sqrt(2)) * r**2)
+    for _ in range(2):
+        push = a * exp(s)
+        s = push * (1 - s) / (1 - push)
+    return s

@@ -119,9 +119,25 @@ def Ei(x: Any) -> Any:
         from .functions import ExponentialIntegral
 
         return ExponentialIntegral(x)
-    from scipy.special import expi
+    return _exponential_integral(float(x))
 
-    return float(expi(x))
+
+def _exponential_integral(x: float) -> np.float64:
+    """As `functions.IN_C` computes it, where the method is told; NaN below zero."""
+    if x > 40.0:
+        terms = np.cumprod(np.append(1.0, np.arange(1, 41) / x))
+        return np.float64(np.exp(x) / x * terms.sum())
+    root, tail = 0.3725074107813666, 1.3140183414386028e-17
+    d = (x - root) - tail
+    near = abs(d) < 0.5 * root
+    total = np.log1p(d / root) if near else np.log(np.float64(x) / root)
+    power, difference, factorial = 1.0, d, 1.0
+    for n in range(1, 151):
+        factorial *= n
+        total += difference / (n * factorial)
+        power *= root
+        difference = x * difference + power * d
+    return np.float64(total)
 
 
 def cross(a: Any, b: Any) -> Any:

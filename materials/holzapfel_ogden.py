@@ -1,10 +1,10 @@
 """Holzapfel–Ogden myocardium, stress free. Holzapfel, Ogden (2009), Phil. Trans. A 367, eq. 5.38.
 
-The matrix takes I1_bar: only the volume term resists a change of volume alone; fibres and sheets
-pull only. Defaults: Table 1, simple shear of pig myocardium.
+The matrix takes I1_bar, which has no stress at rest; fibres and sheets, of the whole I4, pull only.
+Defaults: Table 1, simple shear of pig myocardium.
 """
 
-from supple.energy import Direction, Kinematics, Number, Pa, exp, ogden_volumetric, positive
+from supple.energy import Direction, Kinematics, Number, Pa, axes, exp, ogden_volumetric, positive
 
 exceptions = {"isotropic"}
 
@@ -16,7 +16,8 @@ def psi_dev(
     a_fs: Pa = 216.0, b_fs: Number(above=0.0) = 11.436,
     fibre: Direction = (1.0, 0.0, 0.0), sheet: Direction = (0.0, 1.0, 0.0),
 ):  # fmt: skip
-    f, s, fs = positive(k.I4(fibre) - 1), positive(k.I4(sheet) - 1), k.I8(fibre, sheet)
+    along, across, _ = axes(fibre, sheet)
+    f, s, fs = positive(k.I4(along) - 1), positive(k.I4(across) - 1), k.I8(along, across)
     terms = ((a_f, b_f, f), (a_s, b_s, s), (a_fs, b_fs, fs))
     matrix = a / (2 * b) * (exp(b * (k.I1_bar - 3)) - 1)
     return matrix + sum(m / (2 * c) * (exp(c * x**2) - 1) for m, c, x in terms)

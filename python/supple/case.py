@@ -138,11 +138,15 @@ class Table:
         names = (f"{self._below(key)} {number}" for number in range(1, len(value) + 1))
         return [Table(item, self.file, name) for item, name in zip(value, names, strict=True)]
 
-    def numbers(self, known: Collection[str]) -> dict[str, Any]:
-        """The `known` keys that are there, as finite numbers; any other left over is refused."""
-        self._asked.update(known)
+    def numbers(self, sizes: Mapping[str, int]) -> dict[str, Any]:
+        """The keys of `sizes` that are there, as one or several finite numbers; no other key."""
+        self._asked.update(sizes)
         self.done()
-        return {key: self.number(key) for key in known if key in self._values}
+        return {
+            key: self.number(key) if size == 1 else self.vector(key, size=size)
+            for key, size in sizes.items()
+            if key in self._values
+        }
 
     def done(self) -> None:
         """Refuse every key that nobody asked for."""

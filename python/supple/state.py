@@ -94,7 +94,7 @@ class Equilibrium:
 
     def second_piola(self, at: str = "cells") -> Floats:
         """S = F⁻¹P, Pa, same shapes as `deformation_gradient`."""
-        return self._at(np.linalg.solve(self._values.F, self._values.P), at)
+        return self._at(np.asarray(np.linalg.solve(self._values.F, self._values.P)), at)
 
     def cauchy(self, at: str = "cells") -> Floats:
         """σ = P Fᵀ / J, Pa, same shapes as `deformation_gradient`."""

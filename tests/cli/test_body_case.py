@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from supple.case import Table, read_case
-from supple.cli import _where
+from supple.cli import _body_case, _where
 from supple.errors import InputError
 from supple.mesh import Mesh
 
@@ -72,3 +72,16 @@ def test_a_place_that_is_none_names_its_key(
 ) -> None:
     with pytest.raises(InputError, match=re.escape("case.toml: " + message)):
         _where.nodes(case(tmp_path, f"where = {where}"), mesh)
+
+
+def test_a_fibre_is_three_numbers_in_a_case(tmp_path: Path) -> None:
+    """As Python's fibre=(0, 2, 0); two numbers, or one, are refused with the key."""
+    law = "[material]\nlaw = 'guccione'\nfibre = {}\nc = 900.0\n"
+    made = case(tmp_path, BOX + law.format("[0, 2, 0]"))
+    body, _ = _body_case.read_body(made, allow_energy_files=False)
+    values = body._description.regions[0].values
+    np.testing.assert_array_equal(values["fibre"], [[0.0, 1.0, 0.0]] * 2)
+    np.testing.assert_array_equal(values["c"], [[900.0]] * 2)
+    for wrong in ("[0, 2]", "1.0"):
+        with pytest.raises(InputError, match=r"\[material\] fibre must be a list of 3 numbers"):
+            _body_case.read_body(case(tmp_path, BOX + law.format(wrong)), allow_energy_files=False)

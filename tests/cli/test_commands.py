@@ -1,4 +1,4 @@
-"""`supple solve`, `rest-shape` and `materials`, from files to files."""
+"""`supple solve` and `rest-shape`, from files to files."""
 
 from __future__ import annotations
 
@@ -187,33 +187,6 @@ def test_wrong_options_of_rest_shape_are_bad_input(
     assert main(["rest-shape", *arguments, "--out", "out"]) == 2
     assert message in capsys.readouterr().err
     assert sorted(path.name for path in beam.parent.iterdir()) == ["beam.toml", "beam.vtu"]
-
-
-def test_materials_lists_every_energy_file(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["materials", "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["materials"]
-    shipped = sorted(file.stem for file in (root / "materials").glob("*.py"))
-    assert [material["name"] for material in listed] == shipped
-    assert main(["materials"]) == 0
-    assert "neo_hookean: Compressible neo-Hookean" in capsys.readouterr().out
-
-
-def test_materials_shows_a_file_without_compiling_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "mine.py"
-    file.write_text(
-        '"""Mine."""\nfrom supple.energy import Kinematics, Pa\n\n\n'
-        "def psi(k: Kinematics, stiffness: Pa = 2e3):\n    return stiffness * (k.I1 - 3) ** 2\n"
-    )
-    assert main(["materials", str(file)]) == 0
-    assert capsys.readouterr().out == "mine: Mine.\n    stiffness = 2000 Pa\n"
-    assert list(tmp_path.iterdir()) == [file]
-
-
-def test_an_unknown_material_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["materials", "neohookean"]) == 2
-    assert "neo_hookean" in capsys.readouterr().err
 
 
 def test_version_is_the_one_of_the_package(root: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -61,13 +61,15 @@ def test_qr_strain_is_that_of_numpys_factors(k):
 
 
 @pytest.mark.parametrize("name", ["log_volumetric", "quadratic_volumetric", "ogden_volumetric"])
-@pytest.mark.parametrize("J", [0.7, 1.0, 1.4])
+@pytest.mark.parametrize("J", [0.7, 1.0, 1.3])
 def test_mixed_form_of_a_volumetric_energy_is_the_energy_at_its_best_pressure(name, J):
     """max over p of p g(J) - U*(p) is U(J), so the mixed and the displacement form agree."""
     from scipy.optimize import minimize_scalar
 
     v = getattr(energy, name)(J, 1e4)
-    best = minimize_scalar(lambda p: v.conjugate(p) - p * v.g, bracket=(-900.0, 900.0), tol=1e-12)
+    best = minimize_scalar(
+        lambda p: v.conjugate(p) - p * v.g, bounds=(-9e3, 3.6e3), options={"xatol": 1e-4}
+    )
     assert -best.fun == pytest.approx(v.U, abs=1e-6)
     assert getattr(energy, name)(1.0, 1e4).U == 0.0
 

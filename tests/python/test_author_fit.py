@@ -9,6 +9,7 @@ from scipy import stats
 import supple
 from supple.author import data
 from supple.author.fit_model import Model
+from supple.author.modes import mode_of
 from supple.author.points import PointLaw
 from supple.laws import read_law
 
@@ -104,7 +105,7 @@ def test_intervals_of_a_linear_problem_are_those_of_linear_regression(yeoh):
 
 
 def test_relative_weights_are_the_regression_of_relative_residuals(yeoh):
-    """The same by normal equations divided by |y|, none of them below a hundredth of the largest."""
+    """The same by normal equations divided by |y|, none below a hundredth of the largest."""
     rng, shear = np.random.default_rng(3), np.linspace(0.1, 1.0, 12)
     X = np.column_stack([2 * shear, 4 * shear**3])
     y = (X @ [800.0, 150.0]) * (1 + 0.05 * rng.standard_normal(12))
@@ -118,7 +119,7 @@ def test_the_jacobian_lets_free_faces_move():
     """Against differences of the whole prediction, extrapolated; each kind of stress."""
     x = np.linspace(0.8, 1.6, 5)
     series = [
-        data.Series(data.mode_of(mode), x, np.ones(5), kind, np.ones(5))
+        data.Series(mode_of(mode), x, np.ones(5), kind, np.ones(5))
         for mode, kind in [("uniaxial", "nominal"), ("equibiaxial", "cauchy"),
                            ("planar", "nominal"), ("volumetric", "pressure")]
     ]  # fmt: skip
@@ -144,8 +145,8 @@ def test_volume_and_true_stress_are_fitted_as_well():
     true = supple.curves("neo_hookean", "uniaxial", x, young=2e3, poisson=0.4).cauchy[:, 0, 0]
     ones = np.ones(6)
     series = [
-        data.Series(data.mode_of("volumetric"), J, pressure, "pressure", ones),
-        data.Series(data.mode_of("uniaxial"), x, true, "cauchy", ones),
+        data.Series(mode_of("volumetric"), J, pressure, "pressure", ones),
+        data.Series(mode_of("uniaxial"), x, true, "cauchy", ones),
     ]
     found = supple.fit("neo_hookean", series)
     assert found.values == pytest.approx({"young": 2e3, "poisson": 0.4}, rel=1e-8)
@@ -233,7 +234,7 @@ def test_treloars_rubber_is_fitted_at_least_as_well_as_by_ogden():
         ((stress - KGF_PER_CM2 * ogden(mode, x)) ** 2).sum() for mode, (x, stress) in tests.items()
     )
     names = [n for i in (1, 2, 3) for n in (f"mu{i}", f"alpha{i}")]
-    constants = {n: v for n, v in zip(names, np.ravel(OGDEN), strict=True)}
+    constants = dict(zip(names, np.ravel(OGDEN), strict=True))
     constants |= {n: v * KGF_PER_CM2 for n, v in constants.items() if n.startswith("mu")}
     for mode, (x, _) in tests.items():
         curve = supple.curves("ogden", mode, x, bulk=1e9, **constants)

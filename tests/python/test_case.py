@@ -34,7 +34,7 @@ def test_values_come_back_as_written(tmp_path: Path) -> None:
     assert top.vector("centre") == (1.0, 2.5, -3.0)
     law = top.table("law")
     assert law is not None
-    assert law.numbers(["c1", "c2", "bulk"]) == {"c1": 1.0, "c2": 2.5}
+    assert law.numbers({"c1": 1, "c2": 1, "bulk": 1}) == {"c1": 1.0, "c2": 2.5}
     assert [item.value("where") for item in top.tables("fix")] == [1, 2]
     assert top.table("gravity") is None
     assert top.tables("force") == []

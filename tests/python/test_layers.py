@@ -199,6 +199,6 @@ def test_import_supple_takes_at_most_300_ms() -> None:
 
 
 def test_import_supple_loads_nothing_heavy() -> None:
-    heavy = {"SimpleITK", "cma", "meshio", "plotly", "scipy", "skimage", *GENERATOR}
+    heavy = {"SimpleITK", "cma", "matplotlib", "meshio", "plotly", "scipy", "skimage", *GENERATOR}
     ours = {"supple._core", "supple.breast", "supple.cli"}
     assert not _fresh_import()[1] & (heavy | ours)

@@ -16,10 +16,11 @@ SIZE = np.array([4.0, 1.5, 2.0])
 
 
 def block(element):
-    """A box with a corner that is not the origin, other counts on each axis, and three tags."""
+    """A box with a corner that is not the origin, other counts on each axis, and four tags."""
     mesh = Mesh.box((4, 2, 3), SIZE, element, origin=(1.0, -2.0, 0.5))
     tags = {
         "base": Tag("facets", mesh.boundary(lambda p: p[:, 0] == 1.0)),
+        "edge": Tag("facets", mesh.boundary((mesh.points[:, [0, 2]] == [1.0, 0.5]).any(axis=1))),
         "first": Tag("cells", np.arange(3)),
         "tip": Tag("points", mesh.nodes(lambda p: p[:, 0] == 5.0)),
     }
@@ -153,7 +154,10 @@ def test_nodes_chosen_four_ways_are_the_same(mesh):
     for where in (lambda p: p[:, 0] == 1.0, mesh.points[:, 0] == 1.0, expected[::-1], "base"):
         np.testing.assert_array_equal(mesh.nodes(where), expected)
     np.testing.assert_array_equal(mesh.nodes("first"), np.unique(mesh.cells[:3]))
-    np.testing.assert_array_equal(mesh.boundary("base"), mesh.tags["base"].ids)
+    at_edge = (mesh.points[:, [0, 2]] == [1.0, 0.5]).any(axis=1)
+    np.testing.assert_array_equal(mesh.nodes("edge"), np.flatnonzero(at_edge))
+    for name in ("base", "edge"):
+        np.testing.assert_array_equal(mesh.boundary(name), mesh.tags[name].ids)
     np.testing.assert_array_equal(mesh.cell_ids("first"), mesh.cell_ids([2, 0, 1]))
 
 

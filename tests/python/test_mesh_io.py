@@ -15,10 +15,11 @@ SIZE = np.array([4.0, 1.5, 2.0])
 
 
 def block(element):
-    """A box with a corner that is not the origin, other counts on each axis, and three tags."""
+    """A box with a corner that is not the origin, other counts on each axis, and four tags."""
     mesh = Mesh.box((4, 2, 3), SIZE, element, origin=(1.0, -2.0, 0.5))
     tags = {
         "base": Tag("facets", mesh.boundary(lambda p: p[:, 0] == 1.0)),
+        "edge": Tag("facets", mesh.boundary((mesh.points[:, [0, 2]] == [1.0, 0.5]).any(axis=1))),
         "first": Tag("cells", np.arange(3)),
         "tip": Tag("points", mesh.nodes(lambda p: p[:, 0] == 5.0)),
     }

@@ -1,23 +1,91 @@
-"""What the README shows runs."""
+"""What README and docs show runs.
+
+In a page of docs/, blocks run from top to bottom in one empty folder:
+
+    python, csv  whose first line is "# NAME.py" or "# NAME.csv": that file, written
+    python       runs; its names are there in the next block
+    sh           each line a command that exits with 0
+    text         lines of what the block before printed: of Python's exactly, of a command's up to
+                 its numbers and the folder it ran in
+"""
 
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
 
+from supple.cli import main
 
-def blocks(root: Path) -> list[str]:
-    return re.findall(r"```python\n(.*?)```", (root / "README.md").read_text("utf-8"), re.DOTALL)
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md"))
 
 
-def test_the_example_runs_as_printed(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    exec(compile(blocks(root)[0], "README.md", "exec"), {})
+def blocks(file: Path) -> list[tuple[str, str]]:
+    """(language, text) of each fenced block."""
+    return re.findall(r"^```(\w+)\n(.*?)^```", file.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def readme() -> list[str]:
+    return [text for language, text in blocks(ROOT / "README.md") if language == "python"]
+
+
+def test_the_example_runs_as_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(readme()[0], "README.md", "exec"), {})
     assert re.fullmatch(r"its tip rises by \d+\.\d mm\n", capsys.readouterr().out)
 
 
-def test_the_energy_shown_is_the_one_that_ships(root: Path) -> None:
-    shown = blocks(root)[1].split("\n", 1)
-    shipped = (root / shown[0].removeprefix("# ")).read_text("utf-8")
+def test_the_energy_shown_is_the_one_that_ships() -> None:
+    shown = readme()[1].split("\n", 1)
+    shipped = (ROOT / shown[0].removeprefix("# ")).read_text("utf-8")
     assert shipped.endswith("\n" + shown[1])
+
+
+class Reader:
+    """Does what a page says, block by block, and keeps what was printed last."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self.capsys, self.names, self.printed, self.exactly = capsys, {}, "", True
+
+    def does(self, language: str, text: str) -> None:
+        named = re.match(r"# ([\w-]+\.(?:py|csv))\n", text)
+        if named and language in ("python", "csv"):
+            content = text[named.end() :] if language == "python" else text
+            Path(named[1]).write_text(content, encoding="utf-8")
+        elif language == "python":
+            exec(compile(text, "page", "exec"), self.names)
+            self.printed, self.exactly = self.capsys.readouterr().out, True
+        elif language == "sh":
+            for line in text.splitlines():
+                assert main(shlex.split(line)[1:]) == 0, line
+            self.printed, self.exactly = self.capsys.readouterr().out, False
+        elif language == "text":
+            self.compares(text)
+
+    def compares(self, text: str) -> None:
+        if self.exactly:
+            assert text == self.printed
+            return
+        printed = {plain(line) for line in self.printed.splitlines()}
+        for line in text.splitlines():
+            assert plain(line) in printed, line
+
+
+def plain(line: str) -> str:
+    """A printed line without its numbers, its spacing and the folder it names."""
+    line = line.replace(f"{Path.cwd()}/", "")
+    return re.sub(r"\s+", " ", re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", line)).strip()
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_of_a_page_runs(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown = blocks(ROOT / "docs" / page)
+    assert shown
+    monkeypatch.chdir(tmp_path)
+    reader = Reader(capsys)
+    for language, text in shown:
+        reader.does(language, text)

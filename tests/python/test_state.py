@@ -26,7 +26,7 @@ def test_strains_of_a_linear_field(state):
     assert found.shape == (12, 4, 3, 3)
     np.testing.assert_allclose(found, np.broadcast_to(E, found.shape), atol=1e-13)
     np.testing.assert_allclose(state.volume_ratio(), np.linalg.det(F), rtol=1e-12)
-    with pytest.raises(supple.InputError, match='at must be "cells" or "quadrature"'):
+    with pytest.raises(supple.InputError, match='at must be "cells", "quadrature" or "nodes"'):
         state.cauchy(at="nodes")
 
 

@@ -25,7 +25,7 @@ PLACES = {
 
 def springs(places, inverse=False, stiffness=3.0):
     """A system of nothing but nodes held to the tent."""
-    system = core().System(np.ascontiguousarray(places, dtype=float).ravel())
+    system = core().System(np.ascontiguousarray(places, dtype=float).ravel(), [])
     nodes = list(range(len(places)))
     system.add(
         core().Sliding(

@@ -42,22 +42,40 @@ class Curve:
     @property
     def cauchy(self) -> Floats:
         """σ = P Fᵀ / J (n, 3, 3), Pa."""
-        with np.errstate(invalid="ignore"):  # NaN where there is no state
-            J = np.linalg.det(self.deformation)[:, None, None]
-        return self.nominal @ np.swapaxes(self.deformation, 1, 2) / J
+        return true_stress(self.nominal, self.deformation)
 
     @property
     def stress(self) -> Floats:
         """What the test measures (n,), Pa: nominal stress along the load, or the pressure."""
-        if self.mode.measured is None:
-            return -np.trace(self.cauchy, axis1=1, axis2=2) / 3
-        i, j = self.mode.measured
-        return self.nominal[:, i, j]
+        return reading(self.mode, self.nominal if self.mode.measured else self.cauchy)
 
     @property
     def exists(self) -> npt.NDArray[np.bool_]:
         """(n,) whether the law has a state with finite stress there."""
-        return np.isfinite(self.nominal).all(axis=(1, 2))
+        return _finite(self.nominal)
+
+
+def true_stress(P: Floats, F: Floats) -> Floats:
+    """σ = P Fᵀ / J (n, 3, 3), Pa, of P and F (n, 3, 3); NaN where there is no state."""
+    with np.errstate(invalid="ignore"):
+        J = np.linalg.det(F)[:, None, None]
+    sigma: Floats = P @ np.swapaxes(F, 1, 2) / J
+    return sigma
+
+
+def reading(mode: Mode, stress: Floats) -> Floats:
+    """What a test measures of ``stress`` (n, 3, 3), P or σ: its entry, or the pressure of σ."""
+    if mode.measured is None:
+        pressure: Floats = -np.trace(stress, axis1=1, axis2=2) / 3
+        return pressure
+    i, j = mode.measured
+    entry: Floats = stress[:, i, j]
+    return entry
+
+
+def _finite(P: Floats) -> npt.NDArray[np.bool_]:
+    finite: npt.NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(P).reshape(len(P), 9), axis=1)
+    return finite
 
 
 def curves(
@@ -96,7 +114,7 @@ def along(
     _check(mode, values, axes)
     F = modes.equilibrium(law, mode, values, axes, start)
     P, psi = modes.stress(law, F, axes), modes.energy(law, F, axes)
-    F = np.where(np.isfinite(P).all(axis=(1, 2))[:, None, None], F, np.nan)
+    F = np.where(_finite(P)[:, None, None], F, np.nan)
     a, b, c = axes
     return Curve(mode, values, F, P, psi, (a, b, c))
 

@@ -2,6 +2,8 @@
 
     mode,stretch,nominal_stress_kPa        uniaxial,strain_percent,cauchy_stress_MPa
     uniaxial,1.10,12.5                     …
+
+Measure and unit stand in the name of a column.
 """
 
 from __future__ import annotations
@@ -144,7 +146,7 @@ class _Table:
                 names = ", ".join([*sorted(known), "nominal_stress_kPa", "cauchy_stress_Pa",
                                    "pressure_MPa"])  # fmt: skip
                 raise InputError(
-                    f"{self.file}: unknown column {column!r}; there are {names} (Pa, kPa, MPa, GPa)."
+                    f"{self.file}: unknown column {column!r}; there are {names} (or Pa … GPa)."
                 )
         if len(set(self.head)) < len(self.head):
             raise InputError(f"{self.file}: a column stands twice in the heading.")

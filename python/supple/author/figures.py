@@ -125,9 +125,10 @@ def _shade(axes: Any, curve: Curve, lost: list[Limit]) -> None:
 
 def _write_words(axes: Any, found: Inspection) -> None:
     axes.axis("off")
-    lines = [f"{name} = {_value(value)}{_unit(found, name)}" for name, value in found.values.items()]
+    lines = [f"{name} = {_value(v)}{_unit(found, name)}" for name, v in found.values.items()]
     if "isotropic" in found.law.exceptions:
-        lines += ["", "Pxx: pulled along x;", "equibiaxial in xy, yz, zx;", "planar: next axis held"]
+        lines += ["", "Pxx: pulled along x;", "equibiaxial in xy, yz, zx;"]
+        lines.append("planar: next axis held")
     text = "\n".join(["Parameters", "", *lines])
     axes.text(0.02, 0.98, text, transform=axes.transAxes, va="top",
               fontsize=10 if len(lines) < 16 else 8)  # fmt: skip

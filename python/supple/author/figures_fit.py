@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .curves import along
+from .curves import along, reading
 from .data import Series
 from .figures import AXIS_OF, COLOURS, new_figure, save, unit_of
 from .fit_result import Fit
@@ -18,8 +18,7 @@ def draw_fit(found: Fit, file: Path) -> Path:
     """Data and fitted curve above, residuals below, a column for each series."""
     from ..laws import read_law
 
-    law = PointLaw(read_law(found.material))
-    law.set(**found.values)
+    law = PointLaw(read_law(found.material), **found.values)
     figure = new_figure(max(7.0, 4.2 * len(found.series)), 6.6)
     grid = figure.subplots(
         2, len(found.series), sharex="col", squeeze=False, height_ratios=(2.6, 1.0)
@@ -55,8 +54,5 @@ def _curve(law: PointLaw, series: Series) -> tuple[Any, Any]:
     ends = np.append(series.values, series.mode.rest)
     values = np.linspace(ends.min(), ends.max(), 101)
     curve = along(law, series.mode, values)
-    if series.kind != "cauchy":
-        return values, curve.stress
-    assert series.mode.measured is not None
-    i, j = series.mode.measured
-    return values, curve.cauchy[:, i, j]
+    tensor = curve.nominal if series.kind == "nominal" else curve.cauchy
+    return values, reading(series.mode, tensor)

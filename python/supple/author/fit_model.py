@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import modes
+from .curves import reading, true_stress
 from .data import Series
 from .points import PointLaw
 
@@ -100,13 +101,5 @@ class Model:
 def measured(law: PointLaw, series: Series, F: Floats) -> Floats:
     """The stress (n,) Pa that the test of a series reads at F (n, 3, 3)."""
     P = law.stress(F)
-    if series.kind == "nominal":
-        assert series.mode.measured is not None
-        i, j = series.mode.measured
-        return P[:, i, j]
-    with np.errstate(invalid="ignore"):  # NaN where there is no state
-        cauchy = P @ np.swapaxes(F, 1, 2) / np.linalg.det(F)[:, None, None]
-    if series.mode.measured is None:
-        return -np.trace(cauchy, axis1=1, axis2=2) / 3
-    i, j = series.mode.measured
-    return cauchy[:, i, j]
+    tensor = P if series.kind == "nominal" else true_stress(P, F)
+    return reading(series.mode, tensor)

@@ -1,6 +1,8 @@
 """Everything that `supple materials check` tells of a law.
 
-    file ─► on numbers: ψ(I), σ(I), objective ─► compiled: isotropic, P, A, curves, ellipticity, ψ ≥ 0
+    file ─► on numbers: ψ(I), σ(I), objective ─► compiled: isotropy, P, A, ellipticity, ψ ≥ 0
+
+A file that fails on numbers is not compiled.
 """
 
 from __future__ import annotations
@@ -69,8 +71,7 @@ def inspect_law(material: str | Path, span: Range | None = None, **values: Any) 
         MaterialError: the file cannot be read or computed, or a wrong parameter.
     """
     law, span = read_law(material), span or Range()
-    parameters.given(law, values, 1)
-    known = {p.name: p.default for p in law.parameters} | values
+    known = _numbers(parameters.defaults(law, 1) | parameters.given(law, values, 1))
     scale, tried = _on_numbers(law, known, span)
     if any(p.passed is False and not p.declared for p in tried):
         return Inspection(law, known, scale, tried, compiled=False)
@@ -80,6 +81,10 @@ def inspect_law(material: str | Path, span: Range | None = None, **values: Any) 
     tried += _on_kernels(point, span, scale) + _along(point, drawn, lost, scale)
     tried.append(_not_negative(point, drawn, span, scale))
     return Inspection(law, known, scale, tried, drawn, lost)
+
+
+def _numbers(rows: dict[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
+    return {n: tuple(r[0].tolist()) if r.size > 1 else float(r[0, 0]) for n, r in rows.items()}
 
 
 def _on_numbers(law: Law, values: dict[str, Any], span: Range) -> tuple[float, list[Property]]:
@@ -119,9 +124,7 @@ def _curves(point: PointLaw, span: Range) -> list[Curve]:
     ]
 
 
-def _along(
-    point: PointLaw, drawn: list[Curve], lost: list[Limit], scale: float
-) -> list[Property]:
+def _along(point: PointLaw, drawn: list[Curve], lost: list[Limit], scale: float) -> list[Property]:
     """Ellipticity at rest and along the curves, and where curves end."""
     rest = float(least_wave_stiffness(point.tangent(np.eye(3)[None]))[0]) / scale
     note = "least stiffness of a plane wave over the largest of the law"

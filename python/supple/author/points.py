@@ -44,15 +44,19 @@ class PointLaw:
         from ..kernels.unit import Unit
 
         self.law = law
-        self.values: dict[str, Any] = {p.name: p.default for p in law.parameters}
-        parameters.given(law, values, _common_length(law, values))
-        self.values |= values
+        count = _common_length(law, values)
+        self._rows = parameters.defaults(law, 1) | parameters.given(law, values, count)
         self._library = compiled(Unit("direct", "P1", law.path))
         self._terms: dict[int, Any] = {}
 
-    def set(self, **values: Any) -> None:
-        """New values without a look at their bounds: differences step across them."""
-        self.values |= values
+    @property
+    def values(self) -> dict[str, Any]:
+        """Name → number or direction (3,), where it is the same at all points, else rows."""
+        return {n: _plain(rows) for n, rows in self._rows.items()}
+
+    def set(self, **values: float) -> None:
+        """New numbers, the same at all points, without a look at bounds: differences cross them."""
+        self._rows |= {name: np.array([[value]]) for name, value in values.items()}
 
     def energy(self, F: Floats) -> Floats:
         """ψ (n,) Pa of F (n, 3, 3)."""
@@ -87,13 +91,18 @@ class PointLaw:
         if count not in self._terms:
             points = np.tile(_CELL, (count, 1)).ravel()
             cells = np.arange(4 * count, dtype=np.int32).reshape(count, 4)
-            system = core().System(points)
+            system = core().System(points, [])
             self._terms[count] = core().KernelTerm(self._library, system, cells)
         term = self._terms[count]
-        for p in self.law.parameters:
-            rows = parameters.per_cell(p.name, self.values[p.name], count, p.kind.size)
-            term.set_field(p.name, rows.ravel())
+        for name, rows in self._rows.items():
+            term.set_field(name, np.broadcast_to(rows, (count, rows.shape[1])).ravel())
         return term
+
+
+def _plain(rows: Floats) -> Any:
+    if len(rows) > 1:
+        return rows
+    return float(rows[0, 0]) if rows.shape[1] == 1 else tuple(rows[0].tolist())
 
 
 def _common_length(law: Law, values: dict[str, Any]) -> int:

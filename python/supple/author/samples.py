@@ -50,8 +50,9 @@ class Range:
             "volume ratio": self.volume,
         }[mode.control]
         below = max(3, round(self.points * (mode.rest - low) / (high - low)))
-        ends = np.linspace(low, mode.rest, below), np.linspace(
-            mode.rest, high, self.points - below + 1
+        ends = (
+            np.linspace(low, mode.rest, below),
+            np.linspace(mode.rest, high, self.points - below + 1),
         )
         return np.concatenate([ends[0], ends[1][1:]])
 

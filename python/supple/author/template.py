@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import InputError
 
-TEMPLATE = '''"""NAME: a nearly incompressible Yeoh solid; write here the formula and where it is from.
+TEMPLATE = '''"""NAME: a nearly incompressible Yeoh solid; write here its formula and source.
 
 psi_dev = c1 (I1_bar - 3) + c2 (I1_bar - 3)²,  psi_vol = bulk/2 ln(J)².  Yeoh (1990).
 """
@@ -37,7 +37,7 @@ def write(file: Path) -> Path:
     """
     if file.suffix != ".py" or not file.stem.isidentifier():
         raise InputError(
-            f"an energy file must be named like a Python module, such as my_law.py, got {file.name}."
+            f"FILE must be named like a Python module, such as my_law.py, got {file.name}."
         )
     try:
         with file.open("x", encoding="utf-8") as stream:

@@ -214,7 +214,7 @@ def _part(table: Table, name: str, law: str) -> dict[str, float]:
 
 def _law_values(table: Table, law: str, skin: bool = False) -> dict[str, float]:
     read = read_law(law)
-    values: dict[str, float] = table.numbers([p.name for p in read.parameters])
+    values: dict[str, float] = table.numbers({p.name: p.kind.size for p in read.parameters})
     table.done()
     with table.named():
         parameters.given(read, values, 1, skin)

@@ -90,8 +90,8 @@ def _law(table: Table, allow_energy_files: bool) -> tuple[str, dict[str, Any]]:
             )
         law = str(table.path("law"))
     with table.named("law"):
-        known = [parameter.name for parameter in material(law).parameters]
-    return law, table.numbers(known)
+        sizes = {parameter.name: parameter.kind.size for parameter in material(law).parameters}
+    return law, table.numbers(sizes)
 
 
 def _supports_and_loads(case: Table, body: Body, mesh: Mesh) -> None:

@@ -44,7 +44,7 @@ def fit(
     line that makes a body of the fit. Columns of a CSV, in any order:
 
     \b
-      mode      uniaxial, equibiaxial, planar, simple_shear or volumetric (not in a file of one test)
+      mode      uniaxial, equibiaxial, planar, simple_shear or volumetric (of the row)
       stretch   or strain, strain_percent, true_strain; shear; volume_ratio
       nominal_stress_kPa   or cauchy_stress_…, pressure_…; in Pa, kPa, MPa or GPa
       weight    optional factor on the row's residual
@@ -67,11 +67,12 @@ def fit(
 
 def _series(files: dict[str, Any]) -> list[Series]:
     from ..author import data
+    from ..author.modes import mode_of
 
     series = [s for file in files.pop("data") for s in data.read_csv(file)]
     for name, file in files.items():
         if file is not None:
-            series += data.read_csv(file, data.mode_of(name))
+            series += data.read_csv(file, mode_of(name))
     if not series:
         raise InputError("there is no data to fit; give --data FILE, or --uniaxial FILE and so on.")
     return series

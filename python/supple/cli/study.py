@@ -24,8 +24,7 @@ def _hanging_dome(run: Run) -> None:
 def _manufactured(run: Run) -> None:
     from ..studies import manufactured, manufactured_figure
 
-    todo = [(c, e) for c in manufactured.CASES for e in manufactured.ELEMENTS]
-    found = []
+    todo, found = manufactured.plan(), []
     for number, (case, element) in enumerate(todo):
         run.progress(f"{case.name} {element}", number / len(todo))
         found.append(manufactured.run(case, element))
@@ -52,8 +51,6 @@ def study(run: Run, name: str) -> None:
     manufactured  a chosen field given back under its exact loads: rates of convergence of
                   displacement and strain for three laws and four elements; exits with 3 if
                   one is more than 0.1 off its theory
-
-    Figures need matplotlib: pip install supple[figures].
     """
     run.out_or(Path("out") / name)
     _STUDIES[name](run)

@@ -20,10 +20,11 @@ import numpy.typing as npt
 from .. import parameters
 from ..body import Body
 from ..core import core
-from ..kernels.cells import FACETS
+from ..kernels.cells import ELEMENTS as TABLES
 from ..kernels.unit import Unit
 from ..laws import compiled, read_law
 from ..mesh import Mesh
+from ..mesh_topology import by_kind
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -32,6 +33,8 @@ AMPLITUDE = 1e-2
 #: A rate may miss its theory by this much.
 BAR = 0.1
 ELEMENTS = ("P1", "P2", "Q1", "Q2")
+#: Put to the thesis' law only.
+FURTHER = ("Q2L", "Pr1", "Pr2")
 #: Cells along an edge of the cube, by the element's degree.
 MESHES = {1: (8, 12, 16, 20), 2: (4, 6, 8, 10)}
 
@@ -58,6 +61,11 @@ CASES = (
 )
 
 
+def plan() -> list[tuple[Case, str]]:
+    """Law and element of every series of the study."""
+    return [(c, e) for c in CASES for e in ELEMENTS] + [(CASES[0], e) for e in FURTHER]
+
+
 @dataclass(frozen=True)
 class Series:
     """Relative errors in the L2 norm of one law and element on refined meshes."""
@@ -70,7 +78,7 @@ class Series:
 
     @property
     def degree(self) -> int:
-        return int(self.element[1])
+        return TABLES[self.element].degree
 
     @property
     def rates(self) -> Floats:
@@ -93,44 +101,48 @@ def exact(X: Floats) -> tuple[Floats, Floats]:
     return X[..., 2, None] * waves, gradient
 
 
-def run(case: Case, element: str, cells: tuple[int, ...] | None = None) -> Series:
+def run(
+    case: Case,
+    element: str,
+    cells: tuple[int, ...] | None = None,
+    formulation: str = "displacement",
+) -> Series:
     """Solve on every mesh; the stiffness is integrated at degree p + 3, loads at 2 p + 4."""
-    counts = MESHES[int(element[1])] if cells is None else cells
-    found = np.array([errors(case, Mesh.box((n, n, n), (1, 1, 1), element)) for n in counts])
+    counts = MESHES[TABLES[element].degree] if cells is None else cells
+    meshes = (Mesh.box((n, n, n), (1, 1, 1), element) for n in counts)
+    found = np.array([errors(case, mesh, formulation) for mesh in meshes])
     return Series(case, element, counts, *found.T)
 
 
-def errors(case: Case, mesh: Mesh) -> tuple[float, float]:
+def errors(case: Case, mesh: Mesh, formulation: str = "displacement") -> tuple[float, float]:
     """Relative errors of u and E, L2 norms, on a mesh of the unit cube."""
     p = mesh.table.degree
-    solid, facets = _terms(case, mesh, 2 * p + 4)
-    body = Body(mesh, case.material, quadrature=p + 3, **case.values)
+    body = Body(mesh, case.material, formulation, quadrature=p + 3, **case.values)
     held = np.flatnonzero(mesh.points[:, 2] < 1e-9)
     body.prescribe(held, exact(mesh.points[held])[0])
-    state = body.force(np.arange(len(mesh.points)), _nodal(mesh, [solid, *facets])).solve()
-    return _errors(solid, state.u)
+    body.force(np.arange(len(mesh.points)), exact_loads(case, mesh, 2 * p + 4))
+    system = _system(mesh)
+    return _errors(_force_term(system, case, mesh, 2 * p + 4), body.solve().u)
 
 
 def exact_loads(case: Case, mesh: Mesh, degree: int) -> Floats:
     """Nodal forces (n, 3), N, of body force and tractions, integrated at ``degree``."""
-    solid, facets = _terms(case, mesh, degree)
-    return _nodal(mesh, [solid, *facets])
+    system, outside = _system(mesh), mesh.boundary()
+    terms = [_force_term(system, case, mesh, degree)]
+    for kind, rows in by_kind(outside, mesh.table):
+        facets = outside[np.ix_(rows, kind.from_vtk)]
+        terms.append(_term(system, case, "manufactured_traction", kind.name, facets, degree))
+    residual = sum(term.residual(np.zeros(mesh.points.size)) for term in terms)
+    return np.asarray(-residual).reshape(-1, 3)  # internal minus external force
 
 
-def _nodal(mesh: Mesh, terms: list[Any]) -> Floats:
-    """Forces (n, 3) of load terms, N; a residual is internal minus external force."""
-    zero = np.zeros(mesh.points.size)
-    return np.asarray(-sum(term.residual(zero) for term in terms)).reshape(-1, 3)
+def _system(mesh: Mesh) -> Any:
+    return core().System(np.ascontiguousarray(mesh.points).ravel(), [])
 
 
-def _terms(case: Case, mesh: Mesh, degree: int) -> tuple[Any, list[Any]]:
-    """The exact body force on the cells and the exact tractions on the whole boundary."""
-    system = core().System(np.ascontiguousarray(mesh.points).ravel())
-    facet = FACETS[mesh.table.facet]
-    cells, outside = mesh.cells[:, mesh.table.from_vtk], mesh.boundary()[:, facet.from_vtk]
-    parts = (("force", mesh.element, cells), ("traction", facet.name, outside))
-    terms = [_term(system, case, f"manufactured_{n}", e, c, degree) for n, e, c in parts]
-    return terms[0], terms[1:]
+def _force_term(system: Any, case: Case, mesh: Mesh, degree: int) -> Any:
+    cells = mesh.cells[:, mesh.table.from_vtk]
+    return _term(system, case, "manufactured_force", mesh.element, cells, degree)
 
 
 def _term(system: Any, case: Case, form: str, element: str, cells: Ints, degree: int) -> Any:

@@ -13,7 +13,10 @@ from ..files import replacing
 if TYPE_CHECKING:
     from .manufactured import Series
 
-_COLOURS = {"P1": "tab:blue", "P2": "tab:orange", "Q1": "tab:green", "Q2": "tab:red"}
+_COLOURS = {
+    "P1": "tab:blue", "P2": "tab:orange", "Q1": "tab:green", "Q2": "tab:red",
+    "Q2L": "tab:purple", "Pr1": "tab:brown", "Pr2": "tab:pink",
+}  # fmt: skip
 _ERRORS = (("u", "displacement u"), ("strain", "Green–Lagrange strain E"))
 
 
