@@ -19,6 +19,6 @@
     build       C source → shared library, kept in the user's cache
     ahead       the units that CMake compiles
 
-Only `reader`, `unit`, `cells`, `degree`, `fingerprint` and `build` are needed to find a library that
-exists: they import neither UFL nor FFCx.
+Only `reader`, `unit`, `cells`, `degree`, `fingerprint` and `build` are needed to find a library
+that exists: they import neither UFL nor FFCx.
 """

@@ -1,7 +1,7 @@
-"""Which kernels are compiled ahead of time, as CMake asks for them; UFL and FFCx are not imported.
+"""Which kernels are compiled ahead of time, as CMake asks for them.
 
-    demo   what `supple predict`, `supple demo` and most tests use
-    all    everything that any shipped law can take
+The choice "demo" is what `supple demo`, `supple predict` and most tests use, "all" is everything
+that any shipped law can take. UFL and FFCx are not imported.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from . import fingerprint, reader
 from .build import GCC_ONLY, OPTIMISATION
 from .law import Law
-from .unit import FACETS, FORMULATIONS, OFFERED, SENSITIVITY, SOLIDS, Unit, loads
+from .unit import FACETS, FORMULATIONS, OFFERED, SENSITIVITY, Unit, loads
 
 DEMO_LAWS = ("neo_hookean", "corotational_polar")
 DEMO_ELEMENTS = ("P1", "P2", "Q1", "Q2")
@@ -48,7 +48,7 @@ CHOICES: dict[str, Callable[[Path], list[Unit]]] = {"demo": demo, "all": everyth
 
 
 def of_law(law: Law) -> list[Unit]:
-    """What a law can take: formulations on their elements if it is a solid's, skins if isotropic."""
+    """What a law can take: formulations on their elements if a solid's, skins if isotropic."""
     takes = {
         "displacement": law.solid,
         "mixed": law.solid and law.is_split,
@@ -66,17 +66,21 @@ def of_law(law: Law) -> list[Unit]:
 
 
 def as_cmake(choice: str, materials: Path) -> str:
-    """What cmake/kernels.cmake needs, as CMake code: units with their law, flags, generator.
+    """What cmake/kernels.cmake needs, as CMake code: flags, generator and calls of add_units.
+
+    The units of one law and form come together, for one process generates them.
 
     Raises:
         EnergyFileError: an energy file that the choice reads is wrong.
     """
-    units = CHOICES[choice](materials)
+    batches: dict[tuple[str, str], list[str]] = {}
+    for unit in CHOICES[choice](materials):
+        batches.setdefault((unit.law.stem if unit.law else "", unit.form), []).append(unit.name)
     lists: dict[str, Iterable[str]] = {
-        "units": (u.name for u in units),
-        "laws": (u.law.stem if u.law else "-" for u in units),
         "flags": OPTIMISATION,
         "gcc_flags": GCC_ONLY,
         "generator": (file.as_posix() for file in fingerprint.sources()),
     }
-    return "".join(f'set({name} "{";".join(items)}")\n' for name, items in lists.items())
+    lines = [f'set({name} "{";".join(items)}")' for name, items in lists.items()]
+    lines += [f'add_units("{law}" {" ".join(names)})' for (law, _), names in batches.items()]
+    return "\n".join(lines)

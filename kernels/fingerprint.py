@@ -1,4 +1,4 @@
-"""Whether generated C is still what the generator would write: a mark that every library carries."""
+"""The mark that a library carries: by it one knows whether the generator of now would write it."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def test_an_element_or_formulation_that_is_not_offered(element, formulation, wor
 @pytest.mark.parametrize(("element", "formulation"), [("P2", "mixed"), ("Q1", "mean-dilatation")])
 def test_a_law_that_gives_its_energy_as_a_whole(element, formulation):
     """In the body and in a region of it; the region's refusal leaves the body as it was."""
-    with pytest.raises(supple.MaterialError, match="psi_dev and psi_vol.*neo_hookean") as caught:
+    with pytest.raises(supple.MaterialError, match=r"psi_dev and psi_vol.*neo_hookean") as caught:
         supple.Body(box(element), "neo_hookean", formulation)
     assert 'use formulation "displacement" or another law' in str(caught.value)
     body = supple.Body(box(element), "mooney_rivlin", formulation)
@@ -44,7 +44,7 @@ def test_pressures_where_there_are_none_or_too_few():
     plain = supple.Body(box("P2"), "mooney_rivlin")
     mixed = supple.Body(box("P2"), "mooney_rivlin", "mixed")
     u = np.zeros_like(plain.mesh.points)
-    with pytest.raises(supple.InputError, match="pressure must be None.*'displacement'.*leave it out"):
+    with pytest.raises(supple.InputError, match=r"must be None.*'displacement'.*leave it out"):
         supple.assemble(plain, u, np.zeros(len(u)))
     with pytest.raises(supple.InputError, match=r"pressure must have shape \(27,\).*\(8,\)"):
         supple.assemble(mixed, u, np.zeros(8))

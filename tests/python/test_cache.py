@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import supple
-from supple.kernels import build
+from supple.kernels import build, fingerprint
 from supple.kernels.unit import Unit
 
 YEOH = '''"""Yeoh solid, nearly incompressible. Yeoh (1990), Rubber Chem. Technol. 63, eq. 3."""
@@ -72,7 +72,8 @@ def use(path, home, *flags):
 
 
 def whole(folder):
-    return [f for f in folder.iterdir() if not f.name.startswith(".") and build._is_whole(f)]
+    """The law's libraries; a load's are there too where nothing was compiled ahead."""
+    return [f for f in folder.glob("yeoh.*") if build._is_whole(f)]
 
 
 def test_an_energy_elsewhere_is_compiled_once_and_then_quick(yeoh, home):
@@ -153,6 +154,24 @@ def test_an_intact_library_is_not_compiled_again(cache, monkeypatch):
 
     monkeypatch.setattr(build, "_compile", refuse)
     assert build.library(unit, ahead, folder) == library
+
+
+def test_a_library_of_another_generator_is_not_used(cache, monkeypatch):
+    """Compiled ahead, then kernels/*.py change: its energy is the same, yet the mark is not."""
+    unit, ahead, folder, library = cache
+    built = ahead / "traction.T1.so"
+    built.write_bytes(library.read_bytes())
+    assert build.library(unit, ahead, folder) == built
+    monkeypatch.setattr(fingerprint, "_generator", lambda: "newer")
+    assert build.library(unit, ahead, folder) == library
+
+
+def test_a_change_of_the_generator_changes_the_mark():
+    """Every file of kernels/ counts, but those that write no C: listing, building, refusing."""
+    sources = {f.name for f in fingerprint.sources()}
+    assert {"generate.py", "volume.py", "elements.py", "kinematics.py", "parts.py"} <= sources
+    assert not sources & {"build.py", "ahead.py", "checks.py", "__main__.py"}
+    assert fingerprint.mark("a") != fingerprint.mark("b")
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
