@@ -157,7 +157,7 @@ def loaded_block(element, formulation):
     def top(p):
         return p[:, 2] > 0.1 - 1e-9
 
-    body.fix(lambda p: p[:, 2] < 1e-9).gravity((0.0, 0.0, 3.0)).traction(top, (20.0, 0.0, 120.0))
+    body.fix(lambda p: p[:, 2] < 1e-9).gravity((0.0, 0.0, 3.0)).traction(top, (20.0, 0.0, 60.0))
     return body.skin(
         lambda p: top(p) | (p[:, 0] > 0.1 - 1e-9), "neo_hookean", thickness=2e-3, young=5e3
     )
@@ -168,7 +168,7 @@ def test_a_round_trip_closes(element, formulation):
     """rest_shape ∘ solve and solve ∘ rest_shape are the identity to 1e-9 of the size."""
     body = loaded_block(element, formulation)
     state = body.solve()
-    assert abs(state.u).max() > 0.01
+    assert abs(state.u).max() > 0.02
     rest = body.on(state.mesh.moved(state.points)).rest_shape()
     assert abs(rest.points - body.mesh.points).max() <= 1e-9 * body.mesh.size
     np.testing.assert_allclose(rest.cauchy(), state.cauchy(), rtol=0, atol=1e-5)
