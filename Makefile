@@ -6,6 +6,7 @@
 .DELETE_ON_ERROR:
 
 BIN := .venv/bin
+PYTEST := $(BIN)/pytest -n auto --dist loadgroup
 SOURCES := CMakeLists.txt $(shell find cpp kernels materials cmake -type f \
 	\( -name '*.[ch]pp' -o -name '*.h' -o -name '*.in' -o -name '*.py' \
 	-o -name '*.cmake' -o -name CMakeLists.txt \) 2>/dev/null)
@@ -20,10 +21,10 @@ demo: .venv/.built ## predict the tumour of a synthetic patient; writes out/demo
 	$(BIN)/supple demo --out out/demo
 
 test: .venv/.built .venv/.dev ## the fast tests
-	$(BIN)/pytest -m "not slow"
+	$(PYTEST) -m "not slow"
 
 test-slow: .venv/.built .venv/.dev ## the tests that take minutes
-	$(BIN)/pytest -m slow
+	$(PYTEST) -m slow
 
 test-cpp: .venv/.built ## the C++ tests, optimised and under the address and behaviour sanitizers
 	for preset in release debug; do \

@@ -37,9 +37,22 @@ def shared() -> Path:
     return folder
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """All tests of one kernel library run in one process, so that it is compiled once."""
+    for item in items:
+        unit = getattr(item, "callspec", None) and item.callspec.params.get("unit")
+        if isinstance(unit, str):
+            item.add_marker(pytest.mark.xdist_group(unit))
+
+
 @pytest.fixture(scope="session")
 def compiled_units(request: pytest.FixtureRequest) -> None:
-    """Every kernel library that the chosen tests name in their parameter ``unit``, compiled."""
+    """Every kernel library that the chosen tests name in their parameter ``unit``, compiled.
+
+    Where tests run in several processes, each test compiles its own: all are busy anyway.
+    """
+    if hasattr(request.config, "workerinput"):
+        return
     names = sorted(
         {
             item.callspec.params["unit"]
