@@ -20,7 +20,7 @@ LONGEST = 15_000
 #: Most definitions of a part.
 PART = 3000
 
-_DEFINITION = re.compile(r"^\s*(?:static const |const )?(double|bool) (\w+) = ([^{}]*);$")
+_DEFINITION = re.compile(r"^\s*(?:static const |const )?(double|bool|int) (\w+) = ([^{}]*);$")
 _OTHER_ARRAY = re.compile(r"\b(?!w\[)\w+\[")
 _VARIABLE = re.compile(r"\b[A-Za-z_]\w*\b(?!\s*[\[(])")
 

@@ -381,7 +381,8 @@ class Body:
                 f"start must be a state of this mesh with {len(self.mesh.points)} nodes, "
                 f"got one with {len(start.u)}."
             )
-        return unknowns(self, start.u, start.pressure)
+        mixed = self._description.formulation == "mixed"  # another formulation's state may start it
+        return unknowns(self, start.u, start.pressure if mixed else None)
 
 
 def unknowns(body: Body, u: npt.ArrayLike, pressure: npt.ArrayLike | None = None) -> Floats:
@@ -396,10 +397,15 @@ def unknowns(body: Body, u: npt.ArrayLike, pressure: npt.ArrayLike | None = None
     if pressure is None:
         return np.append(moved, np.zeros(len(nodes)))
     p = np.asarray(pressure, dtype=float)
-    if not len(nodes) or p.shape != (len(moved),):
+    if not len(nodes):
         raise InputError(
-            f"pressure must have shape ({len(moved)},) and a mixed formulation, got {p.shape} "
-            f"and {body._description.formulation!r}."
+            f"pressure must be None in formulation {body._description.formulation!r}, which has "
+            'none of its own; leave it out or make the body with formulation "mixed".'
+        )
+    if p.shape != (len(moved),):
+        raise InputError(
+            f"pressure must have shape ({len(moved)},), one a node, got {p.shape}; "
+            "nodes that are no corners may hold any number."
         )
     return np.append(moved, p[nodes])
 
@@ -443,7 +449,7 @@ def _require_offered(formulation: str, element: str) -> None:
     if element not in OFFERED[formulation]:
         raise InputError(
             f"formulation {formulation!r} wants a mesh of {' or '.join(OFFERED[formulation])}, "
-            f"got {element}; use Mesh.elevated() or another formulation."
+            f"got {element}; use another mesh (elevated() gives P2, Q2L) or another formulation."
         )
 
 

@@ -75,6 +75,13 @@ def test_force_and_traction_add_and_gravity_sets():
     assert abs(residual(again.clear_loads())).max() < 1e-15
 
 
+def test_a_row_a_node_is_as_good_as_a_force_on_each():
+    nodes, zero = MESH.nodes(right), np.zeros_like(U)
+    one = body().force(right, (0.0, 2.0, 0.0))
+    each = body().force(nodes, np.tile([0.0, 2.0, 0.0], (len(nodes), 1)))
+    np.testing.assert_array_equal(supple.assemble(one, zero)[1], supple.assemble(each, zero)[1])
+
+
 def test_reactions_balance_the_loads():
     """Equilibrium of the whole body: reactions + weight + force = 0, at prescribed dofs only."""
     b = body(density=1000.0, young=1e6).fix(left).gravity((0, 0, -9.81))
@@ -136,6 +143,7 @@ def test_assemble_leaves_supports_out():
         ),
         (lambda: body().gravity(9.81), supple.InputError, "gravity must be three|g must be three"),
         (lambda: body().force(right, (1.0, 2.0)), supple.InputError, "force must be three"),
+        (lambda: body().force(right, np.ones((1, 3))), supple.InputError, "force must be finite"),
         (lambda: body().traction(right, (0, 0, np.nan)), supple.InputError, "traction must be thr"),
         (lambda: body().traction(right, (0, 0, 1.0), per="area"), supple.InputError, "per must be"),
         (lambda: body().traction([0], (0, 0, 1.0)), supple.InputError, "no boundary facet"),

@@ -27,7 +27,7 @@ def test_strains_of_a_linear_field(state):
     np.testing.assert_allclose(found, np.broadcast_to(E, found.shape), atol=1e-13)
     np.testing.assert_allclose(state.volume_ratio(), np.linalg.det(F), rtol=1e-12)
     with pytest.raises(supple.InputError, match='at must be "cells", "quadrature" or "nodes"'):
-        state.cauchy(at="nodes")
+        state.cauchy(at="corners")
 
 
 def test_energy_is_that_of_assemble(state):

@@ -18,11 +18,13 @@ LAWS = {m.name: read_law(m.path) for m in supple.materials()}
 SOLIDS = [name for name, law in LAWS.items() if law.solid]
 #: Laws whose kernels are compiled with Supple, and on which elements: every form is quick.
 AHEAD, AHEAD_ON = ("neo_hookean", "corotational_polar"), ("P1", "P2", "Q1", "Q2")
+#: Laws without exponentials or limits near the states of these tests.
+SMOOTH = (*AHEAD, "saint_venant_kirchhoff", "mooney_rivlin", "corotational_qr")
 #: Units that every test run compiles beside those; the others are slow.
 QUICK = (
     *("neo_hookean.Q2L.direct", "neo_hookean.Pr1.direct", "neo_hookean.Pr1.inverse"),
     *("saint_venant_kirchhoff.P1.direct", "corotational_qr.P1.direct", "ogden.P1.direct"),
-    *("mooney_rivlin.Q1.direct", "holzapfel_gasser_ogden.P1.direct", "hooke.P1.direct"),
+    *("mooney_rivlin.Q1.direct", "hooke.P1.direct"),
     *("mooney_rivlin.P2.mixed_direct", "mooney_rivlin.P2.mixed_inverse"),
     *("mooney_rivlin.Q1.mean_dilatation_direct", "mooney_rivlin.Q1.mean_dilatation_inverse"),
 )
@@ -89,24 +91,29 @@ def dense(system, x):
     return csr_array(system.tangent(x), shape=(x.size, x.size))
 
 
+def step(unit):
+    """Of the differences: shorter where exponentials and fibres' limits leave it less room."""
+    return 2e-3 if unit.split(".")[0] in SMOOTH else 2e-4
+
+
 def direction(size):
     return np.random.default_rng(2).uniform(-1, 1, size)
 
 
 @pytest.mark.parametrize("unit", units("direct"))
-def test_residual_is_the_derivative_of_the_energy(case, assert_slope):
+def test_residual_is_the_derivative_of_the_energy(unit, case, assert_slope):
     """R·d against central differences of Π; of a mixed form's saddle by the pressures too."""
     d = direction(case.x.size)
     slope = case.system.residual(case.x, 1.0) @ d
-    assert_slope(lambda x: case.system.energy(x, 1.0), slope, case.x, d, 1e-3)
+    assert_slope(lambda x: case.system.energy(x, 1.0), slope, case.x, d, step(unit))
 
 
 @pytest.mark.parametrize("unit", units("direct", "inverse"))
-def test_tangent_is_the_derivative_of_the_residual(case, assert_slope):
+def test_tangent_is_the_derivative_of_the_residual(unit, case, assert_slope):
     """K d against central differences of R."""
     d = direction(case.x.size)
     slope = dense(case.system, case.x) @ d
-    assert_slope(lambda x: case.system.residual(x, 1.0), slope, case.x, d, 1e-3)
+    assert_slope(lambda x: case.system.residual(x, 1.0), slope, case.x, d, step(unit))
 
 
 @pytest.mark.parametrize("unit", units("direct"))
@@ -206,7 +213,6 @@ def test_turning_all_turns_the_forces_and_turning_the_body_alone_does_not(unit, 
     fibres = [p.name for p in LAWS[unit.split(".")[0]].parameters if p.kind.size == 3]
     turned = case.mesh.moved(case.mesh.points @ rotation.T)
     n = case.u.size
-    x = np.append(case.u @ rotation.T, case.x[n:])
     expected = case.system.residual(case.x, 1.0)
     expected[:n] = (expected[:n].reshape(-1, 3) @ rotation.T).ravel()
     values = case.body._description.regions[0].values
@@ -215,7 +221,9 @@ def test_turning_all_turns_the_forces_and_turning_the_body_alone_does_not(unit, 
         if follow:
             body.set(**{name: values[name] @ rotation.T for name in fibres})
         built = body._system()
-        found = built.system.residual(x, 1.0)
+        scale = case.built.scalar_unit / built.scalar_unit  # of one and the same pressure
+        found = built.system.residual(np.append(case.u @ rotation.T, scale * case.x[n:]), 1.0)
+        found[n:] *= scale
         same = abs(found - expected).max() < 1e-9 * abs(expected).max()
         assert same == (follow or not fibres)
 

@@ -19,12 +19,16 @@ pytestmark = pytest.mark.slow
 
 SIZE, CELLS = np.array([0.04, 0.01, 0.01]), np.array([8, 2, 2])
 F, S, T = (np.array(axis) / 3 for axis in ([2, 1, 2], [-2, 2, 1], [2, -1, 2]))
-#: Traction, Pa, and parameters: isotropic, orthotropic, two families that pull only.
+#: Traction, Pa, and parameters: isotropic, orthotropic, two families that pull only, and a soft
+#: matrix with fibres 300 times as stiff and exponents up to 16.
 CASES = {
     "demiray": (60.0, {"bulk": 2e4}),
     "costa": (120.0, {"bulk": 2e4, "fibre": F, "sheet": S}),
     "holzapfel_gasser_ogden": (150.0, {"bulk": 3e4, "k2": 10.0, "fibre1": F, "fibre2": T}),
+    "holzapfel_ogden": (30.0, {"bulk": 2e4, "fibre": F, "sheet": S}),
 }
+#: Most that the rule may change, and most beside the mesh's own error.
+LIMITS = {"holzapfel_ogden": (2e-2, 0.6)}
 ELEMENTS = ("P1", "P2", "Q1", "Q2")
 
 
@@ -51,7 +55,10 @@ def change(found, exact):
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize("law", CASES)
 def test_the_pinned_rule_costs_less_than_the_mesh(law, element):
-    """At most 1 % of the displacement and a quarter of the mesh's own error; on P1 nothing."""
+    """At most 1 % of the displacement and a quarter of the mesh's own error; on P1 nothing.
+
+    More for the Holzapfel–Ogden law, 2 % and 0.6 of it: give it a higher degree where that matters.
+    """
     exact = at_corners(bent(law, "Q2", refined=2, quadrature=6))
     pinned, full = bent(law, element), bent(law, element, quadrature=10)
     by_rule, by_mesh = change(pinned.u, full.u), change(at_corners(full), exact)
@@ -59,8 +66,9 @@ def test_the_pinned_rule_costs_less_than_the_mesh(law, element):
     if element == "P1":
         assert by_rule < 1e-12, both  # F is the same in a whole cell, and one point integrates it
     else:
-        assert by_rule < 1e-2, both
-        assert by_rule < by_mesh / 4, both
+        most, share = LIMITS.get(law, (1e-2, 0.25))
+        assert by_rule < most, both
+        assert by_rule < share * by_mesh, both
 
 
 @pytest.mark.parametrize("law", CASES)

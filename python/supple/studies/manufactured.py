@@ -2,9 +2,10 @@
 
     field → loads from ψ (kernels/forms/manufactured.py) → solve → errors of u and E → rates
 
-U = 1e-2 z (e^x, e^y, e^z) m on the unit cube (Mazier 2022, eq. 64): its face z = 0 is held, every
-other face carries the traction P N, the inside the body force -Div P. The error of u falls as
-h^(p+1), that of the Green–Lagrange strain E as h^p, both in the L2 norm.
+U = 1e-2 z (e^x, e^y, e^z) m on the unit cube (Mazier 2022, eq. 64; the scripts of SofaCaribou, from
+which that grew, take 1e-3 and a cylinder): its face z = 0 is held, every other face carries the
+traction P N, the inside the body force -Div P. The error of u falls as h^(p+1), that of the
+Green–Lagrange strain E as h^p, both in the L2 norm.
 """
 
 from __future__ import annotations

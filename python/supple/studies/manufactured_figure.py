@@ -17,6 +17,7 @@ _COLOURS = {
     "P1": "tab:blue", "P2": "tab:orange", "Q1": "tab:green", "Q2": "tab:red",
     "Q2L": "tab:purple", "Pr1": "tab:brown", "Pr2": "tab:pink",
 }  # fmt: skip
+_MARKERS = {"Q1": "s", "Q2": "s", "Q2L": "D", "Pr1": "^", "Pr2": "^"}
 _ERRORS = (("u", "displacement u"), ("strain", "Green–Lagrange strain E"))
 
 
@@ -48,7 +49,8 @@ def _panel(axes: Any, series: Sequence[Series], name: str, number: int) -> None:
     for s in series:
         h, error = 1 / np.array(s.cells), getattr(s, name)
         label = f"{s.element}, slope {s.rates[number, -1]:.2f}"
-        axes.loglog(h, error, "o-", color=_COLOURS.get(s.element), ms=4, label=label)
+        colour, marker = _COLOURS.get(s.element), _MARKERS.get(s.element, "o")
+        axes.loglog(h, error, f"{marker}-", color=colour, ms=5, mfc="none", lw=1, label=label)
     for degree in sorted({s.degree for s in series}):
         lowest = min((s for s in series if s.degree == degree), key=lambda s: getattr(s, name)[-1])
         h, order = 1 / np.array(lowest.cells), degree + 1 - number
@@ -58,4 +60,4 @@ def _panel(axes: Any, series: Sequence[Series], name: str, number: int) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels([f"1/{n}" for n in counts])
     axes.grid(True, which="major", alpha=0.3)
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=7, loc="lower left")
