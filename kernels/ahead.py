@@ -17,6 +17,7 @@ from .unit import FACETS, FORMULATIONS, OFFERED, SENSITIVITY, Unit, loads
 DEMO_LAWS = ("neo_hookean", "corotational_polar")
 DEMO_ELEMENTS = ("P1", "P2", "Q1", "Q2")
 DEMO_SKIN = "neo_hookean"
+DEMO_FACETS = ("T1", "T2", "S1", "S2")
 #: The synthetic patient's own law, element and form.
 DEMO_TRUTH = ("mooney_rivlin", "Q1", "direct")
 WAYS = ("direct", "inverse")
@@ -29,7 +30,7 @@ def demo(materials: Path) -> list[Unit]:
         return Unit(form, element, materials / f"{law}.py")
 
     solids = [unit(law, e, way) for law in DEMO_LAWS for e in DEMO_ELEMENTS for way in WAYS]
-    skins = [unit(DEMO_SKIN, facet, f"skin_{way}") for facet in FACETS for way in WAYS]
+    skins = [unit(DEMO_SKIN, facet, f"skin_{way}") for facet in DEMO_FACETS for way in WAYS]
     return [*loads(), *solids, *skins, unit(*DEMO_TRUTH)]
 
 

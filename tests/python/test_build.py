@@ -127,17 +127,16 @@ def test_a_new_energy_needs_no_edit(root, tmp_path):
     assert "yeoh.P2.mixed_direct" not in tree.units()
 
 
-def test_c_that_stays_the_same_is_left_alone(root, tmp_path):
-    """Written a second time with the same text: not touched, so Ninja compiles nothing."""
+def test_what_cmake_runs_writes_one_whole_c_file_a_unit(root, tmp_path):
+    """The real generator, as its command line is used; a wrong name is one sentence, no file."""
     contract = root / "cpp/include/supple/kernel.h"
-    command = [sys.executable, "-m", "kernels", "traction.T1", "--materials", root / "materials",
+    command = [sys.executable, "-m", "kernels", "--materials", root / "materials",
                "--contract", contract, "--out", tmp_path]  # fmt: skip
-    home = {**os.environ, "PYTHONPATH": str(root), "PYTHONHASHSEED": "0"}
-    for _ in range(2):
-        subprocess.run(command, env=home, check=True)
-        os.utime(tmp_path / "traction.T1.c", (1, 1))
-    subprocess.run(command, env=home, check=True)
-    assert (tmp_path / "traction.T1.c").stat().st_mtime == 1
-    (tmp_path / "traction.T1.c").write_text("old", encoding="utf-8")
-    subprocess.run(command, env=home, check=True)
+    home = {**os.environ, "PYTHONPATH": str(root)}
+    subprocess.run([*command, "traction.T1", "pressure.T1"], env=home, check=True)
+    assert {f.name for f in tmp_path.iterdir()} == {"traction.T1.c", "pressure.T1.c"}
     assert "supple_kernels" in (tmp_path / "traction.T1.c").read_text(encoding="utf-8")
+    done = subprocess.run([*command, "traction.P1.T1"], env=home, capture_output=True, text=True,
+                          check=False)  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.startswith("unit: expected law.element.form")
