@@ -85,3 +85,30 @@ def test_a_fibre_is_three_numbers_in_a_case(tmp_path: Path) -> None:
     for wrong in ("[0, 2]", "1.0"):
         with pytest.raises(InputError, match=r"\[material\] fibre must be a list of 3 numbers"):
             _body_case.read_body(case(tmp_path, BOX + law.format(wrong)), allow_energy_files=False)
+
+
+def test_formulation_and_quadrature_are_those_of_the_body(tmp_path: Path) -> None:
+    """Mean dilatation with 27 points: the case's body is the one of the same line of Python."""
+    text = "[material]\nlaw = 'mooney_rivlin'\nformulation = 'mean-dilatation'\nquadrature = 4\n"
+    body, _ = _body_case.read_body(case(tmp_path, BOX + text), allow_energy_files=False)
+    described = body._description
+    assert (described.formulation, described.quadrature) == ("mean-dilatation", 4)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (
+            "formulation = 'mixed'",
+            "[material] formulation 'mixed' wants a mesh of P2 or Q2L, got Q1",
+        ),
+        ("quadrature = 99", "[material] quadrature"),
+        ("quadrature = 0", "[material] quadrature must be a whole number"),
+    ],
+)
+def test_a_wrong_formulation_or_rule_names_its_table(
+    tmp_path: Path, line: str, message: str
+) -> None:
+    text = f"{BOX}[material]\nlaw = 'mooney_rivlin'\n{line}\n"
+    with pytest.raises(InputError, match=re.escape(message)):
+        _body_case.read_body(case(tmp_path, text), allow_energy_files=False)

@@ -1,7 +1,7 @@
 """A body from a case file: mesh, material, supports, loads, in the words of `supple.Body`.
 
 [mesh]      file = "beam.msh", unit = "mm"       or  box = { cells, size, element }, in m
-[material]  law = "neo_hookean", density, and the law's parameters
+[material]  law = "neo_hookean", density, formulation, quadrature (degree), and the law's parameters
 [[region]]  where, law, parameters               [skin]        where, law, thickness, parameters
 [[fix]]     where                                [[prescribe]] where, metre = [x, y, z]
 [[force]]   where, newton = [x, y, z] each node  [[traction]]  where, pascal = [x, y, z]
@@ -73,10 +73,11 @@ def _optional(table: Table, key: str) -> str | None:
 
 def _material(case: Table, mesh: Mesh, allow_energy_files: bool) -> Body:
     table = case.required("material")
-    density = table.number("density", 0.0)
+    density, formulation = table.number("density", 0.0), table.text("formulation", "displacement")
+    degree = table.integer("quadrature", minimum=1) if "quadrature" in table else None
     law, parameters = _law(table, allow_energy_files)
     with table.named():
-        return Body(mesh, law, density=density, **parameters)
+        return Body(mesh, law, formulation, density, degree, **parameters)
 
 
 def _law(table: Table, allow_energy_files: bool) -> tuple[str, dict[str, Any]]:

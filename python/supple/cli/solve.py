@@ -22,6 +22,7 @@ def solve(run: Run, case: Path, allow_energy_files: bool) -> None:
       [mesh]       file = "beam.msh", unit = "mm"
       [mesh.box]   cells = [8, 2, 2], size = [0.08, 0.02, 0.02], element = "Q1"
       [material]   law = "neo_hookean", density = 1000.0, young = 3e3, poisson = 0.3
+                   formulation = "mixed" or "mean-dilatation", quadrature = 4 (degree)
       [[region]]   where, law and its parameters: another law on some cells
       [skin]       where, law, thickness = 2e-3 and the law's parameters
       [[fix]]      where = { x = "min" }
