@@ -100,9 +100,9 @@ def test_formulation_and_quadrature_are_those_of_the_body(tmp_path: Path) -> Non
     [
         (
             "formulation = 'mixed'",
-            "[material] formulation 'mixed' wants a mesh of P2 or Q2L, got Q1",
+            "[material]: formulation 'mixed' wants a mesh of P2 or Q2L",
         ),
-        ("quadrature = 99", "[material] quadrature"),
+        ("quadrature = 99", "[material]: quadrature must be a degree"),
         ("quadrature = 0", "[material] quadrature must be a whole number"),
     ],
 )
