@@ -67,6 +67,72 @@ TEST(scatter_reads_one_lane_of_many) {
   CHECK(plain == batched);
 }
 
+/// Scalars behind the nodes: one for each corner of the box, every cell couples its four with its
+/// nodes.
+struct MixedCase {
+  Index nodes = fixtures::box_nodes(3, 2, 2);
+  Connectivity tetrahedra = fixtures::box_tetrahedra(3, 2, 2);
+  Connectivity cells{tetrahedra.rows(), 8};
+  BlockPattern pattern;
+
+  MixedCase() {
+    cells << tetrahedra, tetrahedra.array() + nodes;
+    std::vector<Index> home(static_cast<std::size_t>(nodes));
+    std::iota(home.begin(), home.end(), 0);
+    pattern = block_pattern(nodes, {cells}, home);
+  }
+  /// Dofs of a cell in the order of its matrix: 3 for each node, then 1 for each scalar.
+  std::vector<Index> dofs(Eigen::Index cell) const {
+    std::vector<Index> result;
+    for (Eigen::Index a = 0; a < 8; ++a)
+      for (Index i = 0; i < (a < 4 ? 3 : 1); ++i)
+        result.push_back(pattern.first_dof(cells(cell, a)) + i);
+    return result;
+  }
+};
+
+/// Summing the cell matrices by dof numbers into a dense matrix gives the same matrix.
+TEST(scatter_with_scalars_equals_dense_assembly) {
+  const MixedCase box;
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  Vector values = Vector::Zero(box.pattern.nonzeros());
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(box.pattern.dofs(), box.pattern.dofs());
+  for (Index c = 0; c < static_cast<Index>(box.cells.rows()); ++c) {
+    Eigen::Matrix<double, 16, 16, Eigen::RowMajor> k;
+    for (Eigen::Index e = 0; e < k.size(); ++e)
+      k.data()[e] = uniform(random);
+    scatter_add(box.pattern.scatter[0], c, k.data(), values.data());
+    const std::vector<Index> dofs = box.dofs(c);
+    for (std::size_t r = 0; r < dofs.size(); ++r)
+      for (std::size_t s = 0; s < dofs.size(); ++s)
+        expected(dofs[r], dofs[s]) += k(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(s));
+  }
+  CHECK(box.pattern.dofs() == 4 * box.nodes);
+  CHECK_BELOW((fixtures::dense(box.pattern, values) - expected).cwiseAbs().maxCoeff(),
+              1e-13 * expected.norm());
+}
+
+/// A scalar's unknown belongs to the group of its home, whose neighbours it shares.
+TEST(scalars_are_grouped_with_their_home) {
+  const MixedCase box;
+  const Mask free = Mask::Constant(box.pattern.dofs(), true);
+  const Reduction reduction = reduce(box.pattern, free, Storage::Lower);
+  for (Index a = 0; a < box.nodes; ++a) {
+    CHECK(reduction.pattern.group[static_cast<std::size_t>(3 * a)] == a);
+    CHECK(reduction.pattern.group[static_cast<std::size_t>(3 * box.nodes + a)] == a);
+  }
+  for (std::size_t r = 0; r + 1 < box.pattern.row_start.size(); ++r)
+    CHECK(std::is_sorted(box.pattern.column.begin() + box.pattern.row_start[r],
+                         box.pattern.column.begin() + box.pattern.row_start[r + 1]));
+}
+
+TEST(scalars_before_nodes_are_refused) {
+  Connectivity mixed_up(1, 2);
+  mixed_up << 4, 0;
+  CHECK_THROWS(block_pattern(4, {mixed_up}, {0}), ShapeError);
+}
+
 /// Columns ascend, the pattern is symmetric, and holds the neighbours that a search over cells
 /// finds.
 TEST(pattern_is_the_node_graph) {
