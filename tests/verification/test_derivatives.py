@@ -80,7 +80,7 @@ def case(unit, distorted):
     return make_case(unit, distorted)
 
 
-def make_case(unit, distorted):
+def make_case(unit, distorted, strain=1.0):
     law, element, form = unit.split(".")
     mesh = distorted(element, (2, 1, 1))
     formulation = next(f for f, p in FORMULATIONS.items() if form in (f"{p}direct", f"{p}inverse"))
@@ -88,7 +88,7 @@ def make_case(unit, distorted):
     spread = np.linspace(0.8, 1.25, len(mesh.cells))
     body.set(**{p.name: per_cell(p, spread) for p in LAWS[law].parameters})
     built = body._system(form.endswith("inverse"))
-    u = stretched(mesh.points)
+    u = strain * stretched(mesh.points)
     rng = np.random.default_rng(5)
     x = np.append(u, 0.02 * rng.uniform(-1, 1, built.system.scalars))
     return SimpleNamespace(body=body, mesh=mesh, built=built, system=built.system, x=x, u=u,
@@ -109,9 +109,8 @@ def dense(system, x):
 
 
 def step(unit):
-    """Of the differences: shorter with exponentials, and so short that none crosses a kink."""
-    law = unit.split(".")[0]
-    return 2e-3 if law in SMOOTH else 2e-5 if law in KINKED else 2e-4
+    """Of the differences: shorter where exponentials and fibres' limits leave it less room."""
+    return 2e-3 if unit.split(".")[0] in SMOOTH else 2e-4
 
 
 def direction(size):
@@ -131,7 +130,8 @@ def test_tangent_is_the_derivative_of_the_residual(unit, case, assert_slope):
     """K d against central differences of R."""
     d = direction(case.x.size)
     slope = dense(case.system, case.x) @ d
-    assert_slope(lambda x: case.system.residual(x, 1.0), slope, case.x, d, step(unit))
+    h = step(unit) / (10 if unit.split(".")[0] in KINKED else 1)  # crosses no kink
+    assert_slope(lambda x: case.system.residual(x, 1.0), slope, case.x, d, h)
 
 
 @pytest.mark.parametrize("unit", units("direct"))
@@ -261,7 +261,9 @@ def test_sensitivities_are_the_derivatives_of_the_residual(unit, distorted):
     """∂R/∂(each parameter) and ∂R/∂X against Richardson differences of R, to 1e-8."""
     from supple.state import Rest, State
 
-    case = make_case(unit.removesuffix("_sensitivity"), distorted)
+    # With exponentials some 20 % are 1e23 Pa, beside which one parameter's share cannot be seen.
+    strain = 1.0 if unit.split(".")[0] in SMOOTH else 0.3
+    case = make_case(unit.removesuffix("_sensitivity"), distorted, strain)
     n, scalars = case.u.size, case.system.scalars
     nodal = None
     if scalars:
@@ -312,12 +314,17 @@ def move(parameter, value, values):
 
 
 def assert_derivative(found, change, name):
-    """h⁶ by Richardson from central differences at h, h/2, h/4, at a step that crosses no kink."""
+    """h⁶ by Richardson from central differences at h, h/2, h/4.
+
+    At a step so long that rounding of R does not count, so short that none crosses a kink.
+    """
     errors = []
-    for h in (1e-2, 1e-3, 1e-4):
+    for h in (5e-2, 1e-2, 1e-3, 1e-4, 1e-5):
         d = [(change(h / k) - change(-h / k)) / (2 * h / k) for k in (1, 2, 4)]
         first, second = (4 * d[1] - d[0]) / 3, (4 * d[2] - d[1]) / 3
         expected = (16 * second - first) / 15
+        if not found.any() and not expected.any():
+            return  # R does not depend on it: fibres that are slack everywhere
         errors.append(abs(found - expected).max() / abs(expected).max())
         if errors[-1] <= 1e-8:
             return
