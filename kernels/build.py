@@ -10,6 +10,7 @@ the second finds the first's result in place; one that is killed leaves a folder
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import platform
@@ -165,5 +166,6 @@ def _compile(unit: Unit, contract: str, cached: Path) -> None:
 def _sweep(folder: Path) -> None:
     """Remove what killed processes left behind."""
     for left in folder.glob(".compiling-*"):
-        if time.time() - left.stat().st_mtime > _ABANDONED:
-            shutil.rmtree(left, ignore_errors=True)
+        with contextlib.suppress(FileNotFoundError):  # its own process has just finished it
+            if time.time() - left.stat().st_mtime > _ABANDONED:
+                shutil.rmtree(left, ignore_errors=True)

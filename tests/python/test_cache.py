@@ -114,9 +114,11 @@ def test_two_processes_at_once_and_one_killed_leave_a_usable_cache(yeoh, home):
     use(yeoh, home)
     left = next(kernels(home).glob(".compiling-*"))
     os.utime(left, (0, 0))
+    gone = kernels(home) / ".compiling-gone"  # as if its process took it away meanwhile
+    gone.symlink_to("nowhere")
     yeoh.write_text(YEOH.replace("500.0", "501.0"), encoding="utf-8")
     use(yeoh, home, "compile")
-    assert not list(kernels(home).glob(".compiling-*"))  # the next compilation sweeps old ones
+    assert list(kernels(home).glob(".compiling-*")) == [gone]  # compilations sweep old ones
 
 
 @pytest.fixture
