@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, parameters, supports, terms
+from . import newton, overlap, parameters, supports, terms
 from .errors import InputError, MaterialError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
@@ -267,6 +267,7 @@ class Body:
         atol: float | None = None,
         max_iterations: int = 25,
         progress: Progress | None = None,
+        check_overlap: bool = False,
     ) -> Rest:
         """The shape without the loads, taking the mesh for the loaded shape.
 
@@ -275,6 +276,8 @@ class Body:
                 the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
+            check_overlap: refuse a rest shape of which two parts are in one place
+                (`supple.overlap.overlapping`); one with cells inside out is always refused.
 
         Raises:
             InputError: as in `solve`.
@@ -294,6 +297,8 @@ class Body:
         fields = outcome(result, built, self._description, self._fixed)
         rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
         newton.require_usable(rest)
+        if check_overlap:
+            overlap.require_apart(rest.mesh)
         return rest
 
     def on(self, mesh: Mesh) -> Body:
