@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from .laws import materials as materials
     from .mesh import Mesh as Mesh
     from .mesh import Tag as Tag
+    from .overlap import overlapping as overlapping
+    from .prestress import Prestress as Prestress
+    from .rest_check import RoundTrip as RoundTrip
+    from .rest_check import round_trip as round_trip
     from .state import Rest as Rest
     from .state import State as State
     from .surface import Surface as Surface
@@ -30,7 +34,9 @@ _HOME = {
     "Body": "body",
     "Material": "laws",
     "Mesh": "mesh",
+    "Prestress": "prestress",
     "Rest": "state",
+    "RoundTrip": "rest_check",
     "State": "state",
     "Surface": "surface",
     "Tag": "mesh",
@@ -39,6 +45,8 @@ _HOME = {
     "fit": "author.fit",
     "material": "laws",
     "materials": "laws",
+    "overlapping": "overlap",
+    "round_trip": "rest_check",
     "sensitivity": "sensitivity",
 }
 

@@ -10,7 +10,7 @@ from supple.mesh_topology import by_kind
 
 Ints = npt.NDArray[np.int64]
 
-#: Triangles (t, 3) of each kind of facet, its nodes in VTK order: corners, middles of edges, middle.
+#: Triangles (t, 3) of each kind of facet; nodes in VTK order: corners, middles of edges, middle.
 _SPLITS = {
     "T1": ((0, 1, 2),),
     "T2": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),

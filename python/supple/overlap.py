@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .box_pairs import meeting
 from .boundary_triangles import triangles_of
+from .box_pairs import meeting
 from .errors import ConvergenceError
 from .mesh_checks import some
 from .mesh_topology import facet_uses
@@ -52,10 +52,10 @@ def overlapping(mesh: Mesh, depth: float = DEPTH) -> Ints:
     return np.unique(rows[found])
 
 
-def cells_of(mesh: Mesh, rows: Ints) -> Ints:
-    """Cells (k,) that rows of ``mesh.boundary()`` are facets of, sorted."""
+def owners(mesh: Mesh) -> Ints:
+    """The cell (f,) that each row of ``mesh.boundary()`` is a facet of."""
     _, uses = facet_uses(mesh.cells, mesh.table)
-    return np.unique(np.flatnonzero(uses == 1)[rows] // len(mesh.table.facets))
+    return np.asarray(np.flatnonzero(uses == 1) // len(mesh.table.facets))
 
 
 def require_apart(mesh: Mesh, what: str = "rest shape") -> None:
@@ -67,7 +67,7 @@ def require_apart(mesh: Mesh, what: str = "rest shape") -> None:
     rows = overlapping(mesh)
     if not len(rows):
         return
-    cells, cause = cells_of(mesh, rows), f"{what} overlaps itself"
+    cells, cause = np.unique(owners(mesh)[rows]), f"{what} overlaps itself"
     raise ConvergenceError(
         f"no usable rest shape: the {cause} at {len(rows)} boundary facets of cells {some(cells)}; "
         "try a smaller load, a stiffer material or a skin, or leave check_overlap out.",
