@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .core import core
 from .errors import ConvergenceError, InputError, MeshError
+from .mesh_checks import some
 from .mesh_jacobian import smallest_jacobian
 
 if TYPE_CHECKING:
@@ -114,12 +115,12 @@ def require_usable(rest: Rest) -> None:
     try:
         _ = rest.mesh
     except MeshError:
-        cause = _CAUSES_INVERSE["inverted"]
+        cause, cells = _CAUSES_INVERSE["inverted"], inverted(rest)
         raise ConvergenceError(
-            f"{cause}: the shape found has cells that are inside out at their corners; "
+            f"{cause}: in the shape found cells {some(cells)} are inside out at their corners; "
             "try a smaller load, a stiffer material, a skin or a finer mesh.",
             history=rest.history,
-            cells=inverted(rest),
+            cells=cells,
             load_factor=1.0,
             cause=cause,
             points=rest.points,
