@@ -45,6 +45,15 @@ def test_the_example_runs_as_printed(capsys: pytest.CaptureFixture[str]) -> None
     assert re.fullmatch(r"its tip rises by \d+\.\d mm\n", capsys.readouterr().out)
 
 
+def test_the_section_on_the_rest_shape_goes_on_from_the_example(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(readme()[0] + readme()[2], "README.md", "exec"), {})
+    assert capsys.readouterr().out.endswith("mm\nreached\n")
+    assert (tmp_path / "loaded.vtu").is_file()
+
+
 def test_the_energy_shown_is_the_one_that_ships() -> None:
     shown = readme()[1].split("\n", 1)
     shipped = (ROOT / shown[0].removeprefix("# ")).read_text("utf-8")
