@@ -15,7 +15,7 @@ from .errors import InputError, MaterialError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
-from .state import Rest, State, outcome
+from .state import Equilibrium, Rest, State, outcome
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -262,6 +262,7 @@ class Body:
         self,
         method: str = "inverse",
         density_of: str = "rest",
+        start: Rest | None = None,
         load_steps: int | None = None,
         rtol: float = 1e-10,
         atol: float | None = None,
@@ -274,6 +275,8 @@ class Body:
             method: "inverse" (exact, one solve) or "reversed-gravity" (approximate: the loads act
                 the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
+            start: a rest shape of this mesh to start from, as after a small change of the body;
+                from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
 
         Raises:
@@ -285,10 +288,13 @@ class Body:
         if density_of not in ("rest", "loaded"):
             raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
+        if start is not None and not isinstance(start, Rest):
+            raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
+        begin = None if start is None else self._start(start)
         if method == "inverse":
-            result, built = self._run(settings, inverse=True, density_of=density_of)
+            result, built = self._run(settings, begin, inverse=True, density_of=density_of)
         else:
-            result, built = self._reversed()._run(settings)
+            result, built = self._reversed()._run(settings, begin)
         newton.require_converged(result, built, self._description, inverse=True)
         solved = terms.snapshot(self._description)
         fields = outcome(result, built, self._description, self._fixed)
@@ -375,7 +381,7 @@ class Body:
             normals |= dict(zip(slide.nodes.tolist(), landed.normal, strict=True))
         return normals
 
-    def _start(self, start: State) -> Floats:
+    def _start(self, start: Equilibrium) -> Floats:
         if start.u.shape != self._prescribed.shape:
             raise InputError(
                 f"start must be a state of this mesh with {len(self.mesh.points)} nodes, "
