@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "supple/error.hpp"
+#include "supple/krylov.hpp"
 
 namespace supple {
 
@@ -14,6 +15,7 @@ namespace {
 constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
+constexpr double kSettled = 1e-3; // accuracy of the step that shows that no more are needed
 constexpr double kDoubtful = 1e8; // growth of LDLᵀ above which the signs of its pivots mean little
 constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
 
@@ -163,7 +165,9 @@ class Path {
     Vector r = residual(u, s);
     const double first = free_norm(r);
     double norm = first, best = std::numeric_limits<double>::infinity();
-    record(s, 0, norm, tolerance(u, r, s), 0.0, 1.0);
+    double tol = tolerance(u, r, s);
+    record(s, 0, norm, tol, 0.0, 1.0);
+    Forcing forcing;
     // Steps that lower an energy cannot run away: cutting the load instead would lose their ground.
     const bool descends = manner == Manner::Guarded && minimises_;
     const int limit = descends ? kPatience * settings_.max_iterations : settings_.max_iterations;
@@ -174,7 +178,7 @@ class Path {
       const bool moves_supports = d.cwiseAbs().maxCoeff() > 0.0;
       Vector rhs = -r;
       if (moves_supports) rhs -= system_.apply(d);
-      d += system_.solve(rhs);
+      d += system_.solve(rhs, forcing.next(norm, tol));
       if (!d.allFinite()) return Outcome::Singular;
       const double length = line_search(u, d, r, norm, s, manner, moves_supports);
       if (length == 0.0) return fault();
@@ -182,7 +186,8 @@ class Path {
       r = residual(u, s);
       norm = free_norm(r);
       result_.last_residual = r;
-      const double tol = tolerance(u, r, s), step = length * d.cwiseAbs().maxCoeff();
+      const double step = length * d.cwiseAbs().maxCoeff();
+      tol = tolerance(u, r, s);
       record(s, k, norm, tol, step, length);
       if (!std::isfinite(norm)) return Outcome::Inverted;
       if (norm <= tol && length == 1.0 && shift_ == 0.0 && settled(u, r, norm, step, s)) {
@@ -201,7 +206,7 @@ class Path {
   bool settled(Vector& u, Vector& r, double norm, double step, double s) {
     const double limit = settings_.step_tol * settings_.size;
     if (step <= limit) return true;
-    const Vector d = system_.solve(-r);
+    const Vector d = system_.solve(-r, kSettled);
     const Vector next = u + d;
     const Vector r_next = residual(next, s);
     if (free_norm(r_next) <= norm) {
