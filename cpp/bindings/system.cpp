@@ -150,7 +150,9 @@ void bind_system(py::module_& module) {
       .def_readonly("assembly", &supple::Timings::assembly)
       .def_readonly("factor", &supple::Timings::factor)
       .def_readonly("solve", &supple::Timings::solve)
-      .def_readonly("total", &supple::Timings::total);
+      .def_readonly("total", &supple::Timings::total)
+      .def_readonly("factorisations", &supple::Timings::factorisations)
+      .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
         return std::make_unique<System>(std::make_shared<const Vector>(std::move(points)),
@@ -159,6 +161,7 @@ void bind_system(py::module_& module) {
       .def_property_readonly("scalars", &System::scalars)
       .def("add", &System::add)
       .def("set_free", &System::set_free)
+      .def("use_gmres", &System::use_gmres)
       .def("energy", &System::energy)
       .def("residual", &System::residual)
       .def("external", &System::external)

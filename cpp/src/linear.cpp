@@ -146,6 +146,18 @@ SolveReport Factor::solve(const ConstVector& rhs, MutableVector x, const Refinem
   return report;
 }
 
+void Factor::apply_inverse(const ConstVector& rhs, MutableVector x) {
+  State& s = *state_;
+  if (!s.factorised)
+    throw StateError("apply_inverse needs a factor; call factorise and look at its status first");
+  require_size("rhs", rhs.size(), s.pattern.size, "give one entry for each unknown");
+  require_size("x", x.size(), s.pattern.size, "give one entry for each unknown");
+  if (s.empty()) return;
+  const BlasThreads threads(blas_threads(s.backend->flops()));
+  s.rhs = rhs; // x may be the same vector
+  s.backend->solve(s.rhs.data(), x.data());
+}
+
 Inertia Factor::inertia() const {
   if (state_->kind != Kind::QuasiDefinite || !state_->factorised)
     throw StateError(

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "supple/krylov.hpp"
+
 namespace supple {
 
 namespace {
@@ -11,6 +13,7 @@ namespace {
 constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
+constexpr double kSettled = 1e-3; // accuracy of the step that shows that no more are needed
 constexpr double kDoubtful = 1e8; // growth of LDLᵀ above which the signs of its pivots mean little
 constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
 constexpr int kHopeless = 3;      // full steps in a row after which the residual must have halved
@@ -37,8 +40,9 @@ class Gain {
 Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
   p_.result.worst = {};
   Vector r = p_.residual(u, s);
-  double norm = p_.free_norm(r);
-  p_.record({s, 0, norm, p_.tolerance(u, r, s), 0.0, 1.0, shift_});
+  double norm = p_.free_norm(r), tol = p_.tolerance(u, r, s);
+  p_.record({s, 0, norm, tol, 0.0, 1.0, shift_});
+  Forcing forcing;
   // Steps that lower an energy cannot run away: cutting the load instead would lose their ground.
   const bool descends = manner == Manner::Guarded && p_.minimises;
   const int limit = (descends ? kPatience : 1) * p_.settings.max_iterations;
@@ -50,7 +54,7 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     const bool moves_supports = d.cwiseAbs().maxCoeff() > 0.0;
     Vector rhs = -r;
     if (moves_supports) rhs -= p_.system.apply(d);
-    d += p_.system.solve(rhs);
+    d += p_.system.solve(rhs, forcing.next(norm, tol));
     if (!d.allFinite()) return Outcome::Singular;
     const double length = line_search(u, d, r, norm, s, manner, moves_supports);
     if (length == 0.0) return fault();
@@ -58,7 +62,8 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     r = p_.residual(u, s);
     norm = p_.free_norm(r);
     p_.result.last_residual = r;
-    const double tol = p_.tolerance(u, r, s), step = length * d.cwiseAbs().maxCoeff();
+    tol = p_.tolerance(u, r, s);
+    const double step = length * d.cwiseAbs().maxCoeff();
     p_.record({s, k, norm, tol, step, length, shift_});
     if (!std::isfinite(norm)) return Outcome::Inverted;
     if (norm <= tol && length == 1.0 && shift_ == 0.0 && settled(u, r, norm, step, s)) {
@@ -95,7 +100,7 @@ Outcome LoadStep::factorise(const Vector& u, double s, Manner manner) {
 bool LoadStep::settled(Vector& u, Vector& r, double norm, double step, double s) {
   const double limit = p_.settings.step_tol * p_.settings.size;
   if (step <= limit) return true;
-  const Vector d = p_.system.solve(-r);
+  const Vector d = p_.system.solve(-r, kSettled);
   const Vector next = u + d;
   const Vector r_next = p_.residual(next, s);
   if (p_.free_norm(r_next) <= norm) {

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 METHODS = ("inverse", "reversed-gravity")
+SOLVERS = ("auto", "gmres", "direct")
 
 
 class Body:
@@ -267,6 +268,7 @@ class Body:
         rtol: float = 1e-10,
         atol: float | None = None,
         max_iterations: int = 25,
+        solver: str = "auto",
         progress: Progress | None = None,
     ) -> Rest:
         """The shape without the loads, taking the mesh for the loaded shape.
@@ -278,6 +280,8 @@ class Body:
             start: a rest shape of this mesh to start from, as after a small change of the body;
                 from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
+            solver: of the inverse's unsymmetric tangents: "gmres" on few symmetric factorisations,
+                LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres".
 
         Raises:
             InputError: as in `solve`.
@@ -287,12 +291,16 @@ class Body:
             raise InputError(f"method must be one of {METHODS}, got {method!r}.")
         if density_of not in ("rest", "loaded"):
             raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
+        if solver not in SOLVERS:
+            raise InputError(f"solver must be one of {SOLVERS}, got {solver!r}.")
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         if start is not None and not isinstance(start, Rest):
             raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
         begin = None if start is None else self._start(start)
         if method == "inverse":
-            result, built = self._run(settings, begin, inverse=True, density_of=density_of)
+            result, built = self._run(
+                settings, begin, inverse=True, density_of=density_of, gmres=solver != "direct"
+            )
         else:
             result, built = self._reversed()._run(settings, begin)
         newton.require_converged(result, built, self._description, inverse=True)
@@ -337,6 +345,7 @@ class Body:
         start: Floats | None = None,
         inverse: bool = False,
         density_of: str = "rest",
+        gmres: bool = False,
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
         native.warm = start is not None
@@ -347,6 +356,7 @@ class Body:
         native.refuse_inversion = inverse or len(barriers) < len(laws)
         scalars = np.zeros(built.system.scalars)
         built.system.set_free(np.append(~self._fixed.ravel(), scalars == 0))
+        built.system.use_gmres(gmres)
         built.system.reset_timings()
         target = np.append(-self._prescribed if inverse else self._prescribed, scalars)
         if start is None:

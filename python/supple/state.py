@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+_TIMINGS = ("assembly", "factor", "solve", "total", "factorisations", "krylov_iterations")
+
 
 @dataclass(frozen=True)
 class PointValues:
@@ -40,7 +42,8 @@ class Equilibrium:
         u: (n, 3) displacement of the nodes of the mesh that was solved on, m.
         iterations: Newton iterations over all load steps.
         history: one dict an iteration.
-        timings: seconds of "assembly", "factor", "solve", "total".
+        timings: seconds of "assembly", "factor", "solve", "total"; how many "factorisations" and
+            "krylov_iterations" there were.
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
@@ -211,7 +214,7 @@ def outcome(
         "pressure": _pressure(result.u[fixed.size :] * built.scalar_unit, d),
         "iterations": sum(1 for i in result.history if i.iteration > 0),
         "history": [as_dict(i) for i in result.history],
-        "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
+        "timings": {n: getattr(t, n) for n in _TIMINGS},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
         "warnings": _warnings(built.system.volume_ratio(result.u)),

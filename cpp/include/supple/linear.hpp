@@ -81,6 +81,10 @@ class Factor {
   /// @throws StateError unless the last factorise was ok; ShapeError on a wrong size.
   SolveReport solve(const ConstVector& rhs, MutableVector x, const Refinement& refinement = {});
 
+  /// x = A⁻¹ rhs as the factor gives it, neither refined nor measured: a preconditioner.
+  /// @throws StateError unless the last factorise was ok; ShapeError on a wrong size.
+  void apply_inverse(const ConstVector& rhs, MutableVector x);
+
   /// @throws StateError unless the kind is QuasiDefinite and the last factorise was ok.
   Inertia inertia() const;
 
