@@ -155,11 +155,12 @@ void bind_system(py::module_& module) {
       .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
-        return std::make_unique<System>(std::make_shared<const Vector>(std::move(points)),
+        return std::make_unique<System>(std::make_shared<Vector>(std::move(points)),
                                         std::move(home));
       }))
       .def_property_readonly("scalars", &System::scalars)
       .def("add", &System::add)
+      .def("move_points", &System::move_points)
       .def("set_free", &System::set_free)
       .def("use_gmres", &System::use_gmres)
       .def("energy", &System::energy)
