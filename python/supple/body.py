@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, parameters, supports, terms
+from . import directions, newton, parameters, supports, terms
 from .errors import InputError, MaterialError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
@@ -262,6 +262,7 @@ class Body:
         self,
         method: str = "inverse",
         density_of: str = "rest",
+        directions_of: str = "rest",
         start: Rest | None = None,
         load_steps: int | None = None,
         rtol: float = 1e-10,
@@ -275,21 +276,41 @@ class Body:
             method: "inverse" (exact, one solve) or "reversed-gravity" (approximate: the loads act
                 the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
+            directions_of: the state, "rest" or "loaded", in which the laws' directions (fibres) lie
+                as given. An image of the loaded shape shows "loaded" ones; those at rest are then
+                found with the shape: f0 along F̄⁻¹ f, F̄ a cell's average deformation gradient.
+                Either way `Rest.body` has those at rest.
             start: a rest shape of this mesh to start from, as after a small change of the body;
                 from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
 
         Raises:
             InputError: as in `solve`.
-            ConvergenceError: there is no such rest shape, or none was found, with the cause.
+            ConvergenceError: there is no such rest shape, or none was found, with the cause; or
+                the directions at rest do not settle.
         """
         if method not in METHODS:
             raise InputError(f"method must be one of {METHODS}, got {method!r}.")
         if density_of not in ("rest", "loaded"):
             raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
+        if directions_of not in ("rest", "loaded"):
+            raise InputError(
+                f'directions_of must be "rest" or "loaded", the shape in which the directions of '
+                f"the laws lie as given; got {directions_of!r}."
+            )
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         if start is not None and not isinstance(start, Rest):
             raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
+        if directions_of == "loaded" and directions.has_any(self):
+            return directions.rest_of_loaded(
+                self,
+                start,
+                lambda body, start: body.rest_shape(
+                    method, density_of, "rest", start, load_steps, rtol, atol, max_iterations,
+                    progress,
+                ),
+                mirrored=method == "reversed-gravity",
+            )  # fmt: skip
         begin = None if start is None else self._start(start)
         if method == "inverse":
             result, built = self._run(settings, begin, inverse=True, density_of=density_of)
@@ -298,7 +319,10 @@ class Body:
         newton.require_converged(result, built, self._description, inverse=True)
         solved = terms.snapshot(self._description)
         fields = outcome(result, built, self._description, self._fixed)
-        rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
+        body = self.on(self.mesh)
+        if density_of == "loaded" and body._description.masses is None:
+            body._description.masses = terms.nodal_masses(solved)
+        rest = Rest(**fields, _solved=solved, _form="inverse", method=method, _body=body)
         newton.require_usable(rest)
         return rest
 
