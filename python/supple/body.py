@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import body_checks as checks
-from . import fixed_point, newton, parameters, supports, terms
+from . import newton, parameters, rest_shape, supports, terms
 from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from .surface import Surface
 
 Floats = npt.NDArray[np.float64]
-
-METHODS = ("inverse", "reversed-gravity", *fixed_point.METHODS)
-SOLVERS = ("auto", "gmres", "direct")
 
 
 class Body:
@@ -265,6 +262,7 @@ class Body:
         self,
         method: str = "inverse",
         density_of: str = "rest",
+        directions_of: str = "rest",
         start: Rest | None = None,
         load_steps: int | None = None,
         rtol: float = 1e-10,
@@ -281,6 +279,10 @@ class Body:
                 (forward solves until the loaded shape is met); or "reversed-gravity" (approximate:
                 the loads act the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
+            directions_of: the state, "rest" or "loaded", in which the laws' directions (fibres) lie
+                as given. An image of the loaded shape shows "loaded" ones; those at rest are then
+                found with the shape: f0 along F̄⁻¹ f, F̄ a cell's average deformation gradient.
+                Either way `Rest.body` has those at rest.
             start: a rest shape of this mesh to start from, as after a small change of the body;
                 from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
@@ -290,33 +292,14 @@ class Body:
 
         Raises:
             InputError: as in `solve`.
-            ConvergenceError: there is no such rest shape, or none was found, with the cause.
+            ConvergenceError: there is no such rest shape, or none was found, with the cause; or
+                the directions at rest do not settle.
         """
-        if method not in METHODS:
-            raise InputError(f"method must be one of {METHODS}, got {method!r}.")
-        if density_of not in ("rest", "loaded"):
-            raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
-        if solver not in SOLVERS:
-            raise InputError(f"solver must be one of {SOLVERS}, got {solver!r}.")
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
-        if start is not None and not isinstance(start, Rest):
-            raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
-        begin = None if start is None else self._start(start)
-        chosen = fixed_point.options(fixed_point_options, method)
-        if method in fixed_point.METHODS:
-            return fixed_point.rest_shape(self, method, settings, chosen, density_of)
-        if method == "inverse":
-            result, built = self._run(
-                settings, begin, inverse=True, density_of=density_of, gmres=solver != "direct"
-            )
-        else:
-            result, built = self._reversed()._run(settings, begin)
-        newton.require_converged(result, built, self._description, inverse=True)
-        solved = terms.snapshot(self._description)
-        fields = outcome(result, built, self._description, self._fixed)
-        rest = Rest(**fields, _solved=solved, _form="inverse", method=method, density_of=density_of)
-        newton.require_usable(rest)
-        return rest
+        asked = rest_shape.Request(
+            method, density_of, directions_of, solver, settings, fixed_point_options
+        )
+        return rest_shape.find(self, asked, start)
 
     def on(self, mesh: Mesh) -> Body:
         """The same laws, supports and loads on a moved copy of the mesh, such as ``rest.mesh``."""
@@ -337,6 +320,13 @@ class Body:
         return body
 
     # Inside
+
+    def _weighed_in(self, state: str) -> Body:
+        """A copy whose density counts at rest, or whose nodes have the masses of the loaded shape."""
+        body = self.on(self.mesh)
+        if state == "loaded" and body._description.masses is None:
+            body._description.masses = terms.nodal_masses(self._description)
+        return body
 
     def _reversed(self) -> Body:
         body = self.on(self.mesh)

@@ -115,16 +115,8 @@ class Forward:
         self.history: list[dict[str, float]] = []
         self.timings = dict.fromkeys(PHASES, 0.0)
         self.solves = 0
-        self._body = body.on(body.mesh)
-        if density_of == "loaded":
-            self._weigh()
+        self.body = body._weighed_in(density_of)
         self._scalars = np.zeros(len(terms.pressure_nodes(body._description)))  # Pa
-
-    def _weigh(self) -> None:
-        """Weight that does not change with the rest shape: dead forces, those of the loaded one."""
-        d, still = self._body._description, np.zeros(self.target.size)
-        weight = -self._body._system().body_force.residual(still).reshape(-1, 3)
-        d.forces, d.gravity = d.forces + weight, np.zeros(3)
 
     def shoot(self, points: Floats, settings: newton.Settings, near: bool = False) -> Shot:
         """Solve from rest at ``points`` (n, 3) m, from zero or if ``near`` from the loaded shape.
@@ -132,8 +124,8 @@ class Forward:
         Raises:
             ConvergenceError: no equilibrium. MeshError: ``points`` have inverted cells.
         """
-        body = self._body.on(self._body.mesh.moved(points))
-        body._built = self._body._built
+        body = self.body.on(self.body.mesh.moved(points))
+        body._built = self.body._built
         for built in body._built.values():
             built.system.move_points(np.ascontiguousarray(points).ravel())
         self.solves += 1
@@ -157,7 +149,12 @@ class Forward:
 
 
 def rest_shape(
-    body: Body, method: str, settings: newton.Settings, chosen: FixedPoint, density_of: str
+    body: Body,
+    method: str,
+    settings: newton.Settings,
+    chosen: FixedPoint,
+    density_of: str,
+    start: Rest | None,
 ) -> Rest:
     """The rest shape by one of `METHODS`; `Body.rest_shape` says the rest.
 
@@ -165,7 +162,8 @@ def rest_shape(
         ConvergenceError: the fixed point diverges or stalls, or a forward solve fails.
     """
     forward, misses = Forward(body, density_of), list[float]()
-    shot = _search(body, forward, method, settings, chosen, misses)
+    trial = forward.target if start is None else start.points
+    shot = _search(forward, trial, method, settings, chosen, misses)
     fields = outcome(shot.result, shot.built, body._description, body._fixed) | {
         "u": shot.points - forward.target,
         "iterations": sum(1 for row in forward.history if row["iteration"] > 0),
@@ -175,16 +173,16 @@ def rest_shape(
     solved = terms.snapshot(body._description)
     return Rest(
         **fields, _solved=solved, _form="inverse", method=method, density_of=density_of,
-        solves=forward.solves, misses=tuple(misses),
+        solves=forward.solves, misses=tuple(misses), _body=forward.body.on(body.mesh),
     )  # fmt: skip
 
 
 def _search(
-    body: Body, forward: Forward, method: str, settings: newton.Settings, chosen: FixedPoint,
+    forward: Forward, trial: Floats, method: str, settings: newton.Settings, chosen: FixedPoint,
     misses: list[float],
 ) -> Shot:  # fmt: skip
     """Iterate until a shot meets every node; its misses are added to ``misses``."""
-    acceleration, trial = chosen.acceleration(method), forward.target
+    acceleration, body = chosen.acceleration(method), forward.body
     shot: Shot | None = None
     while True:
         worth = settings if chosen.exact else _worth(settings, misses)

@@ -16,6 +16,7 @@ from .errors import InputError
 from .projection import to_nodes
 
 if TYPE_CHECKING:
+    from .body import Body
     from .mesh import Mesh
 
 Floats = npt.NDArray[np.float64]
@@ -115,6 +116,22 @@ class Equilibrium:
         J = np.asarray(np.linalg.det(self._values.F))
         return np.asarray(J.min(axis=1)) if at == "smallest" else self._at(J, at)
 
+    def directions(self, of: str = "rest") -> dict[str, Floats]:
+        """Directions of the laws, such as fibres: name → unit vectors (c, 3).
+
+        Args:
+            of: "rest", or "loaded" for those of the loaded shape, along F̄ f0 with F̄ the cell's
+                average deformation gradient. NaN in cells whose law has none of that name.
+
+        Raises:
+            InputError: another ``of``.
+        """
+        from . import directions
+
+        if of not in ("rest", "loaded"):
+            raise InputError(f'of must be "rest" or "loaded", got {of!r}.')
+        return directions.of(self, loaded=of == "loaded")
+
     def von_mises(self) -> Floats:
         """sqrt(3/2 s:s) of the averaged Cauchy stress (c,), Pa."""
         sigma = self.cauchy()
@@ -199,6 +216,7 @@ class Rest(Equilibrium):
     density_of: str = "rest"
     solves: int = 0
     misses: tuple[float, ...] = ()
+    _body: Body = field(repr=False, kw_only=True)  # on the loaded shape, with what is its at rest
 
     @property
     def loaded(self) -> Mesh:
@@ -207,8 +225,17 @@ class Rest(Equilibrium):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The rest shape; ``body.on(rest.mesh)`` is the same body on it."""
+        """The rest shape; `body` is the same body on it."""
         return self._solved.mesh.moved(self.points)
+
+    def body(self) -> Body:
+        """The body at rest: on `mesh`, with the laws, supports and loads of the one given.
+
+        Its directions are those at rest, whichever were given. Where the density counted in the
+        loaded shape, gravity pulls at its nodes with the masses that they had there. Solved, it
+        takes the loaded shape again.
+        """
+        return self._body.on(self.mesh)
 
 
 def outcome(
