@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, parameters, supports, terms
-from .errors import InputError, MaterialError
+from . import body_checks as checks
+from . import fixed_point, newton, parameters, supports, terms
+from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
-from .state import Rest, State, outcome
+from .state import Equilibrium, Rest, State, outcome
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from .kernels.law import Law
     from .mesh import Mesh
     from .surface import Surface
 
 Floats = npt.NDArray[np.float64]
 
-METHODS = ("inverse", "reversed-gravity")
+METHODS = ("inverse", "reversed-gravity", *fixed_point.METHODS)
 SOLVERS = ("auto", "gmres", "direct")
 
 
@@ -59,8 +59,8 @@ class Body:
         **values: Any,
     ) -> None:
         law, count = read_law(material), len(mesh.cells)
-        _require_offered(formulation, mesh.element)
-        _require_split(law, formulation)
+        checks.require_offered(formulation, mesh.element)
+        checks.require_split(law, formulation)
         region = terms.Region(law, np.arange(count), parameters.defaults(law, count))
         region.values |= parameters.given(law, values, count)
         rho = parameters.per_cell("density", density, count)
@@ -73,7 +73,7 @@ class Body:
             rho,
             np.zeros(3),
             np.zeros((n, 3)),
-            _degree(mesh, quadrature),
+            checks.degree(mesh, quadrature),
             formulation,
         )
         self._fixed = np.zeros((n, 3), dtype=bool)
@@ -90,7 +90,7 @@ class Body:
     def region(self, cells: CellWhere, material: str | Path, **values: Any) -> Body:
         """Another law on some cells: a mask, ids or a tag. Values as in the constructor."""
         d, law = self._description, read_law(material)
-        _require_split(law, d.formulation)
+        checks.require_split(law, d.formulation)
         ids = self.mesh.cell_ids(cells)
         new = terms.Region(law, ids, parameters.defaults(law, len(ids)))
         new.values |= parameters.given(law, values, len(ids))
@@ -189,7 +189,9 @@ class Body:
         """Add ``force``, N, on the nodes of ``where``: (3,) on each, or one row a node."""
         forces, nodes = self._description.forces.copy(), self.mesh.nodes(where)
         rows = np.ndim(force) == 2
-        forces[nodes] += _rows("force", force, len(nodes)) if rows else _vector("force", force)
+        forces[nodes] += (
+            checks.rows("force", force, len(nodes)) if rows else checks.vector("force", force)
+        )
         self._description.forces = forces
         return self
 
@@ -197,7 +199,7 @@ class Body:
         """Add a dead traction (3,) Pa on the facets of ``where``, per "rest" or "loaded" area."""
         if per not in ("rest", "loaded"):
             raise InputError(f'per must be "rest" or "loaded", got {per!r}.')
-        load = terms.FacetLoad(self.mesh.boundary(where), _vector("traction", traction), per)
+        load = terms.FacetLoad(self.mesh.boundary(where), checks.vector("traction", traction), per)
         self._description.tractions.append(load)
         return self._restructured()
 
@@ -211,7 +213,7 @@ class Body:
 
     def gravity(self, g: npt.ArrayLike) -> Body:
         """Set the acceleration of gravity (3,), m/s²."""
-        self._description.gravity = _vector("gravity", g)
+        self._description.gravity = checks.vector("gravity", g)
         return self
 
     def clear_loads(self) -> Body:
@@ -263,22 +265,28 @@ class Body:
         self,
         method: str = "inverse",
         density_of: str = "rest",
+        start: Rest | None = None,
         load_steps: int | None = None,
         rtol: float = 1e-10,
         atol: float | None = None,
         max_iterations: int = 25,
         solver: str = "auto",
         progress: Progress | None = None,
+        **fixed_point_options: Any,
     ) -> Rest:
         """The shape without the loads, taking the mesh for the loaded shape.
 
         Args:
-            method: "inverse" (exact, one solve) or "reversed-gravity" (approximate: the loads act
-                the other way on the loaded shape; Mazier 2022, chapter 5).
+            method: "inverse" (exact, one solve); "sellier", "sellier-aitken", "sellier-anderson"
+                (forward solves until the loaded shape is met); or "reversed-gravity" (approximate:
+                the loads act the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
+            start: a rest shape of this mesh to start from, as after a small change of the body;
+                from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
             solver: of the inverse's unsymmetric tangents: "gmres" on few symmetric factorisations,
                 LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres".
+            **fixed_point_options: of the methods of "sellier": `fixed_point.FixedPoint`.
 
         Raises:
             InputError: as in `solve`.
@@ -291,14 +299,22 @@ class Body:
         if solver not in SOLVERS:
             raise InputError(f"solver must be one of {SOLVERS}, got {solver!r}.")
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
+        if start is not None and not isinstance(start, Rest):
+            raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
+        begin = None if start is None else self._start(start)
+        chosen = fixed_point.options(fixed_point_options, method)
+        if method in fixed_point.METHODS:
+            return fixed_point.rest_shape(self, method, settings, chosen, density_of)
         if method == "inverse":
-            result, built = self._run(settings, inverse=True, density_of=density_of, gmres=solver != "direct")
+            result, built = self._run(
+                settings, begin, inverse=True, density_of=density_of, gmres=solver != "direct"
+            )
         else:
-            result, built = self._reversed()._run(settings)
+            result, built = self._reversed()._run(settings, begin)
         newton.require_converged(result, built, self._description, inverse=True)
         solved = terms.snapshot(self._description)
         fields = outcome(result, built, self._description, self._fixed)
-        rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
+        rest = Rest(**fields, _solved=solved, _form="inverse", method=method, density_of=density_of)
         newton.require_usable(rest)
         return rest
 
@@ -383,7 +399,7 @@ class Body:
             normals |= dict(zip(slide.nodes.tolist(), landed.normal, strict=True))
         return normals
 
-    def _start(self, start: State) -> Floats:
+    def _start(self, start: Equilibrium) -> Floats:
         if start.u.shape != self._prescribed.shape:
             raise InputError(
                 f"start must be a state of this mesh with {len(self.mesh.points)} nodes, "
@@ -447,49 +463,3 @@ def assemble(
         return energy, residual.reshape(-1, 3), tangent
     unit = np.append(np.ones(n), np.full(flat.size - n, 1 / built.scalar_unit))
     return energy, unit * residual, csr_array(diags_array(unit) @ tangent @ diags_array(unit))
-
-
-def _require_offered(formulation: str, element: str) -> None:
-    from .kernels.unit import OFFERED
-
-    if formulation not in OFFERED:
-        raise InputError(f"formulation must be one of {tuple(OFFERED)}, got {formulation!r}.")
-    if element not in OFFERED[formulation]:
-        raise InputError(
-            f"formulation {formulation!r} wants a mesh of {' or '.join(OFFERED[formulation])}, "
-            f"got {element}; use another mesh (elevated() gives P2, Q2L) or another formulation."
-        )
-
-
-def _require_split(law: Law, formulation: str) -> None:
-    if formulation != "displacement" and not law.is_split:
-        raise MaterialError(
-            f"formulation {formulation!r} needs a law with psi_dev and psi_vol, and {law.name} "
-            'gives psi as a whole; use formulation "displacement" or another law.'
-        )
-
-
-def _degree(mesh: Mesh, quadrature: int | tuple[int, str] | None) -> int | None:
-    """The rule that was asked for, checked before anything is compiled."""
-    from .kernels.degree import checked
-
-    if quadrature is None:
-        return None
-    try:
-        return checked(quadrature, mesh.table.cell.name)
-    except ValueError as problem:
-        raise InputError(str(problem)) from None
-
-
-def _vector(name: str, value: npt.ArrayLike) -> Floats:
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{name} must be three numbers, got {value!r}.")
-    return vector
-
-
-def _rows(name: str, value: npt.ArrayLike, count: int) -> Floats:
-    rows = np.asarray(value, dtype=float)
-    if rows.shape != (count, 3) or not np.isfinite(rows).all():
-        raise InputError(f"{name} must be finite with shape ({count}, 3), got {rows.shape}.")
-    return rows
