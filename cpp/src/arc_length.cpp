@@ -9,15 +9,15 @@ namespace {
 
 constexpr double kFirst = 0.2;     // of the load
 constexpr double kSmallest = 1e-3; // step, of the way that lies behind
-constexpr double kLoose = 1e-6;    // of the forces, on the way; the end is found to rtol
-constexpr double kChord = 0.1;     // fall of the residual with which a factor is kept
-constexpr double kFoldTol = 1e-4;  // of the load, on the largest
+constexpr double kLoose = 1e-4;    // of the forces, on the way; the end is found to rtol
+constexpr double kTight = 1e-6;    // of the forces, where the load is largest
+constexpr double kFar = 0.1;       // of a step: a correction after which the tangent is made anew
+constexpr double kFoldTol = 2e-4;  // of the load, on the largest
 constexpr double kCollapse = 1e-2; // volume ratio of a cell that is taken for collapsed
-constexpr int kCorrections = 8;    // a point
 constexpr int kMostFactors = 300;  // before a fold
-constexpr int kAfterFold = 10;     // at least, to see whether the path comes back
+constexpr int kAfterFold = 8;      // at least, to see whether the path comes back
 
-/// Place of the maximum of the cubic with values a, b and slopes p > 0 > q at 0 and 1.
+/// Place in (0, 1) of the maximum of the cubic with values a, b and slopes p > 0 > q at 0 and 1.
 double cubic_maximum(double a, double b, double p, double q) {
   const double c2 = 3.0 * (b - a) - 2.0 * p - q, c3 = 2.0 * (a - b) + p + q;
   const double root = std::sqrt(std::max(0.0, c2 * c2 - 3.0 * c3 * p));
@@ -25,6 +25,7 @@ double cubic_maximum(double a, double b, double p, double q) {
   return std::isfinite(t) ? std::clamp(t, 0.05, 0.95) : 0.5;
 }
 
+/// The cubic through two points with their tangents; it brings the first one's tangent along.
 ArcPoint between(const ArcPoint& a, const ArcPoint& b, double length, double t) {
   const double h = t * t * (3.0 - 2.0 * t), g = t * (1.0 - t) * (1.0 - t) * length;
   const double k = t * t * (t - 1.0) * length;
@@ -35,9 +36,12 @@ ArcPoint between(const ArcPoint& a, const ArcPoint& b, double length, double t) 
 } // namespace
 
 Outcome ArcLength::run() {
-  if (!start()) return Outcome::Singular;
+  here_.u = p_.result.u;
+  here_.s = p_.result.load_factor;
+  if (!corrector_.begin(here_)) return Outcome::Singular;
+  length_ = kFirst / here_.ds;
   Outcome outcome = Outcome::Converged;
-  while (factors_ < budget()) {
+  while (corrector_.factors() < budget()) {
     const bool last = here_.ds > 0.0 && here_.s + length_ * here_.ds >= 1.0;
     if (last && finish(outcome)) return outcome;
     if (last || !advance()) {
@@ -59,18 +63,7 @@ Outcome ArcLength::end() const {
   return p_.result.worst.value < kCollapse ? Outcome::Inverted : Outcome::Stalled;
 }
 
-/// The tangent at the last equilibrium, scaled so that u and s weigh the same there.
-bool ArcLength::start() {
-  here_ = {p_.result.u, p_.result.load_factor, {}, 1.0};
-  Vector w;
-  if (!factorise(here_, w)) return false;
-  unit_ = std::max(w.squaredNorm(), 1e-300);
-  here_.du = Vector::Zero(w.size());
-  turn(here_, w);
-  length_ = kFirst / here_.ds;
-  return true;
-}
-
+/// The whole load from where the tangent meets it.
 bool ArcLength::finish(Outcome& outcome) {
   Vector u = predict((1.0 - here_.s) / here_.ds).u;
   if (!p_.admissible(u, 1.0)) return false;
@@ -84,20 +77,35 @@ bool ArcLength::finish(Outcome& outcome) {
 
 bool ArcLength::advance() {
   ArcPoint next = predict(length_);
-  if (!correct(next)) return false;
-  const double length = length_;
-  if (here_.ds > 0.0 && next.ds < 0.0) locate_fold(here_, next, length);
+  if (!arrive(next)) return false;
+  if (here_.ds > 0.0 && next.ds < 0.0 && factors_at_fold_ < 0) locate_fold(here_, next, length_);
   before_ = std::move(here_);
   here_ = std::move(next);
   keep(here_);
-  travelled_ += length;
-  last_ = length;
-  if (corrections_ >= 5)
-    length_ *= 0.7;
-  else if (!refused_)
-    length_ *= corrections_ <= 2 ? 2.0 : corrections_ == 3 ? 1.4 : 1.0;
-  refused_ = false;
+  travelled_ += length_;
+  last_ = length_;
+  choose_length();
   return true;
+}
+
+/// On the path, with a tangent to rely on: that of the last factor is no good from far away.
+bool ArcLength::arrive(ArcPoint& next) {
+  const Vector u = next.u;
+  const double s = next.s;
+  if (!corrector_.correct(next, kLoose)) return false;
+  const double moved = corrector_.square(next.u - u, next.s - s);
+  const bool far = moved > kFar * kFar * length_ * length_;
+  return !(far || here_.ds * next.ds < 0.0) || corrector_.refresh(next);
+}
+
+void ArcLength::choose_length() {
+  const int steps = corrector_.steps();
+  if (steps >= 5) {
+    length_ *= 0.7;
+  } else if (!refused_) {
+    length_ *= steps <= 2 ? 2.0 : steps == 3 ? 1.4 : 1.0;
+  }
+  refused_ = false;
 }
 
 void ArcLength::keep(const ArcPoint& point) {
@@ -113,16 +121,15 @@ void ArcLength::locate_fold(ArcPoint low, ArcPoint high, double length) {
     const double t = cubic_maximum(low.s, high.s, length * low.ds, length * high.ds);
     ArcPoint top = between(low, high, length, t);
     if (std::abs(top.s - known) <= kFoldTol * std::abs(known)) break;
-    if (!correct(top)) break;
+    if (!corrector_.correct(top, kTight) || !corrector_.refresh(top)) break;
     keep(top);
     known = top.s;
-    (top.ds > 0.0 ? low : high) = std::move(top);
-    length *= top.ds > 0.0 ? 1.0 - t : t;
+    const bool rises = top.ds > 0.0;
+    length *= rises ? 1.0 - t : t;
+    (rises ? low : high) = std::move(top);
   }
-  if (factors_at_fold_ < 0) {
-    p_.result.fold = known;
-    factors_at_fold_ = factors_;
-  }
+  p_.result.fold = known;
+  factors_at_fold_ = corrector_.factors();
 }
 
 ArcPoint ArcLength::predict(double length) const {
@@ -135,62 +142,6 @@ ArcPoint ArcLength::predict(double length) const {
     next.s += bend * (before_.s - here_.s + last_ * here_.ds);
   }
   return next;
-}
-
-/// Bring a predicted point, with the tangent of the last one, onto the path.
-bool ArcLength::correct(ArcPoint& point) {
-  p_.result.worst = {};
-  if (!p_.admissible(point.u, point.s)) return false;
-  Vector r = p_.residual(point.u, point.s), w;
-  double norm = p_.free_norm(r), before = 0.0;
-  p_.record({point.s, 0, norm, kLoose * p_.scale(point.u, r, point.s), 0.0, 1.0, 0.0});
-  for (corrections_ = 1; corrections_ <= kCorrections; ++corrections_) {
-    const bool fresh = corrections_ == 1 || norm > kChord * before;
-    if (fresh && !factorise(point, w)) return false;
-    Vector d = p_.system.solve(-r);
-    const double ds = -dot(point.du, d) / (point.ds + dot(point.du, w));
-    d += ds * w;
-    if (!d.allFinite()) return false;
-    double a = 1.0;
-    while (a > 0.1 && !p_.admissible(point.u + a * d, point.s + a * ds))
-      a *= 0.5;
-    if (a <= 0.1) return false;
-    point.u += a * d;
-    point.s += a * ds;
-    r = p_.residual(point.u, point.s);
-    before = norm;
-    norm = p_.free_norm(r);
-    p_.result.last_residual = r;
-    const double tol = kLoose * p_.scale(point.u, r, point.s) + p_.settings.atol;
-    p_.record({point.s, corrections_, norm, tol, a * d.cwiseAbs().maxCoeff(), a, 0.0});
-    if (norm <= tol) {
-      turn(point, w);
-      return true;
-    }
-    if (!std::isfinite(norm) || (corrections_ > 2 && norm > 0.5 * before)) return false;
-  }
-  return false;
-}
-
-/// Factorise K, and w = du/ds along the path.
-bool ArcLength::factorise(const ArcPoint& point, Vector& w) {
-  ++factors_;
-  p_.assemble_tangent(point.u, point.s);
-  const FactorStatus status = p_.system.factorise();
-  const bool indefinite = status.cause == FactorStatus::Cause::NotPositiveDefinite;
-  if (!status.ok() && !(indefinite && p_.system.factorise_indefinite().ok())) return false;
-  Vector pull = p_.pull(point.u);
-  if (p_.travel().cwiseAbs().maxCoeff() > 0.0) pull -= p_.system.apply(p_.travel());
-  w = p_.system.solve(pull) + p_.travel();
-  return w.allFinite();
-}
-
-/// The unit tangent from w, pointing on from the tangent that the point brought along.
-void ArcLength::turn(ArcPoint& point, const Vector& w) const {
-  const double along = dot(point.du, w) + point.ds;
-  const double scale = std::copysign(1.0 / std::sqrt(dot(w, w) + 1.0), along);
-  point.du = scale * w;
-  point.ds = scale;
 }
 
 } // namespace supple

@@ -11,48 +11,37 @@
 /// Keller (1977), Numerical solution of bifurcation and nonlinear eigenvalue problems.
 #pragma once
 
+#include "corrector.hpp"
 #include "load_step.hpp"
 
 namespace supple {
 
-/// A point of the path and its unit tangent by arc length.
-struct ArcPoint {
-  Vector u;        ///< (dofs)
-  double s = 0.0;  ///< share of the load
-  Vector du;       ///< (dofs)
-  double ds = 0.0; ///< < 0 where the load falls along the path
-};
-
 class ArcLength {
  public:
-  ArcLength(Problem& problem, LoadStep& step) : p_(problem), step_(step) {}
+  ArcLength(Problem& problem, LoadStep& step) : p_(problem), step_(step), corrector_(problem) {}
 
   /// Follow the path from the problem's last equilibrium; its result is the largest load found.
   Outcome run();
 
  private:
-  bool start();
   bool advance();
   bool finish(Outcome& outcome);
+  bool arrive(ArcPoint& next);
+  void choose_length();
   void locate_fold(ArcPoint low, ArcPoint high, double length);
   ArcPoint predict(double length) const;
-  bool correct(ArcPoint& point);
-  bool factorise(const ArcPoint& point, Vector& w);
-  void turn(ArcPoint& point, const Vector& w) const;
   void keep(const ArcPoint& point);
-  double dot(const Vector& a, const Vector& b) const { return a.dot(b) / unit_; }
   int budget() const;
   Outcome end() const;
 
   Problem& p_;
   LoadStep& step_;
+  Corrector corrector_;
   ArcPoint here_, before_;
-  double unit_ = 1.0;      // ‖u‖² that weighs as much as the whole load
   double length_ = 0.0;    // of the next step
   double last_ = 0.0;      // of the last one, 0 at the start
   double travelled_ = 0.0; // along the path
-  int corrections_ = 0;    // of the last corrector
-  int factors_ = 0, factors_at_fold_ = -1;
+  int factors_at_fold_ = -1;
   bool refused_ = false; // the last step was
 };
 
