@@ -154,7 +154,7 @@ def nodal_masses(d: Description) -> Floats:
     system = new_system(d)
     term = core().KernelTerm(compiled(Unit("body_force", d.mesh.element)), system, _cells(d.mesh))
     term.set_field("value", (d.density * [1.0, 0.0, 0.0]).ravel())
-    force = -term.residual(np.zeros(system.dofs))
+    force = -term.residual(np.zeros(d.mesh.points.size + system.scalars))
     return np.asarray(force[: d.mesh.points.size].reshape(-1, 3)[:, 0])
 
 

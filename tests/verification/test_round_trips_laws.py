@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import supple
-from supple.kernels import build
 from supple.kernels.cells import ELEMENTS
 from supple.kernels.unit import FORMULATIONS
 from supple.laws import read_law
 
+pytestmark = pytest.mark.usefixtures("quick_compiler")
 EDGE = 0.1
 LAWS = {m.name: read_law(m.path) for m in supple.materials()}
 #: A skin's energy (fung_skin) makes no solid; test_membrane.py has the skins.
@@ -37,14 +37,6 @@ def units():
                 for element in ON[formulation]:
                     name = f"{law}.{element}.{prefix}inverse"
                     yield pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
-
-
-@pytest.fixture(autouse=True)
-def quick_compiler(request, monkeypatch):
-    """The slow ones without optimisation: the same C, in a quarter of the compiler's time."""
-    if request.node.get_closest_marker("slow"):
-        flags = tuple("-O0" if flag == "-O3" else flag for flag in build.FLAGS)
-        monkeypatch.setattr(build, "FLAGS", flags)
 
 
 def varied(parameter, spread):
