@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from .overlap import overlapping as overlapping
     from .prestress import Prestress as Prestress
     from .rest_check import RoundTrip as RoundTrip
-    from .rest_check import round_trip as round_trip
+    from .round_trip import reversed_gravity_error as reversed_gravity_error
+    from .round_trip import round_trip_error as round_trip_error
     from .state import Rest as Rest
     from .state import State as State
     from .surface import Surface as Surface
@@ -46,7 +47,8 @@ _HOME = {
     "material": "laws",
     "materials": "laws",
     "overlapping": "overlap",
-    "round_trip": "rest_check",
+    "reversed_gravity_error": "round_trip",
+    "round_trip_error": "round_trip",
     "sensitivity": "sensitivity",
 }
 

@@ -17,9 +17,14 @@ from .prestress import Prestress, prestress, write_loaded
 from .projection import to_nodes
 
 if TYPE_CHECKING:
+    from .body import Body
     from .mesh import Mesh
+    from .rest_check import RoundTrip
 
 Floats = npt.NDArray[np.float64]
+
+#: Keys of `Equilibrium.timings`: seconds, then counts.
+PHASES = ("assembly", "factor", "solve", "total", "factorisations", "krylov_iterations")
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,8 @@ class Equilibrium:
         u: (n, 3) displacement of the nodes of the mesh that was solved on, m.
         iterations: Newton iterations over all load steps.
         history: one dict an iteration.
-        timings: seconds of "assembly", "factor", "solve", "total".
+        timings: seconds of "assembly", "factor", "solve", "total"; how many "factorisations" and
+            "krylov_iterations" there were.
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
@@ -111,6 +117,22 @@ class Equilibrium:
         """J = det F: "smallest" (c,) of each cell's points, or as `energy_density`."""
         J = np.asarray(np.linalg.det(self._values.F))
         return np.asarray(J.min(axis=1)) if at == "smallest" else self._at(J, at)
+
+    def directions(self, of: str = "rest") -> dict[str, Floats]:
+        """Directions of the laws, such as fibres: name → unit vectors (c, 3).
+
+        Args:
+            of: "rest", or "loaded" for those of the loaded shape, along F̄ f0 with F̄ the cell's
+                average deformation gradient. NaN in cells whose law has none of that name.
+
+        Raises:
+            InputError: another ``of``.
+        """
+        from . import directions
+
+        if of not in ("rest", "loaded"):
+            raise InputError(f'of must be "rest" or "loaded", got {of!r}.')
+        return directions.of(self, loaded=of == "loaded")
 
     def von_mises(self) -> Floats:
         """sqrt(3/2 s:s) of the averaged Cauchy stress (c,), Pa."""
@@ -187,10 +209,20 @@ class Rest(Equilibrium):
     """The shape without loads, from a loaded one (Mazier 2022, chapter 3); ``u`` is X - x.
 
     Attributes:
-        method: "inverse" is exact; "reversed-gravity" is an approximation to compare with.
+        method: "inverse" is exact; "reversed-gravity" is an approximation to compare with; those
+            of "sellier" are as exact as they were asked to be.
+        density_of: the state, "rest" or "loaded", that the density counts in.
+        solves: forward solves that a method of "sellier" took, else 0; ``iterations``,
+            ``history`` and ``timings`` are over all of them.
+        misses: after each of its steps the largest distance of a node from where it should be, as
+            a share of the size.
     """
 
     method: str = "inverse"
+    density_of: str = "rest"
+    solves: int = 0
+    misses: tuple[float, ...] = ()
+    _body: Body = field(repr=False, kw_only=True)  # on the loaded shape, with what is its at rest
 
     @property
     def loaded(self) -> Mesh:
@@ -199,8 +231,30 @@ class Rest(Equilibrium):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The rest shape; ``body.on(rest.mesh)`` is the same body on it."""
+        """The rest shape; `body` is the same body on it."""
         return self._solved.mesh.moved(self.points)
+
+    def body(self) -> Body:
+        """The body at rest: on `mesh`, with the laws, supports and loads of the one given.
+
+        Its directions are those at rest, whichever were given. Where the density counted in the
+        loaded shape, gravity pulls at its nodes with the masses that they had there. Solved, it
+        takes the loaded shape again.
+        """
+        return self._body.on(self.mesh)
+
+    def round_trip(self, **settings: Any) -> RoundTrip:
+        """Load the rest shape again, and say how far it misses the given shape, and why.
+
+        Args:
+            **settings: of `Body.solve`.
+
+        Raises:
+            ConvergenceError: loading the rest shape from zero leads to no stable equilibrium.
+        """
+        from .rest_check import round_trip
+
+        return round_trip(self, **settings)
 
     def write_loaded(self, path: str | Path) -> Path:
         """Write the loaded shape as VTU with what it carries: where a later simulation starts.
@@ -225,7 +279,7 @@ def outcome(
         "pressure": _pressure(result.u[fixed.size :] * built.scalar_unit, d),
         "iterations": sum(1 for i in result.history if i.iteration > 0),
         "history": [as_dict(i) for i in result.history],
-        "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
+        "timings": {n: getattr(t, n) for n in PHASES},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
         "warnings": _warnings(built.system.volume_ratio(result.u)),

@@ -292,6 +292,6 @@ def test_wrong_options_are_named_and_nothing_is_written(
 
 
 def test_the_methods_are_those_of_the_body() -> None:
-    from supple.body import METHODS as known
+    from supple.rest_shape import METHODS as known
 
     assert known == METHODS

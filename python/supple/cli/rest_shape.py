@@ -14,16 +14,16 @@ from ..errors import ConvergenceError, InputError
 from ._run import Run, command
 
 if TYPE_CHECKING:
-    from ..body import Body
     from ..state import Rest
 
-METHODS = ("inverse", "reversed-gravity")
+METHODS = ("inverse", "reversed-gravity", "sellier", "sellier-aitken", "sellier-anderson")
 #: What may lie behind a rest shape that does not come back.
 _WHY = {
     "another equilibrium": "it has several stable shapes under this load, and this is another one",
     "unstable": "the given shape is an equilibrium that a push would leave",
     "no equilibrium": "the given shape is no equilibrium of it",
 }
+_ASKED = ("method", "density_of", "directions_of", "solver", "check_overlap")
 _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwise here
 
 
@@ -34,7 +34,8 @@ _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwi
     type=click.Choice(METHODS),
     default="inverse",
     show_default=True,
-    help="reversed-gravity is approximate, to compare with: its check fails.",
+    help="sellier's are fixed points of forward solves, to compare with; reversed-gravity is "
+    "approximate: its check fails.",
 )
 @click.option(
     "--density-of",
@@ -42,6 +43,20 @@ _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwi
     default="rest",
     show_default=True,
     help="The state that the density counts in.",
+)
+@click.option(
+    "--directions-of",
+    type=click.Choice(("rest", "loaded")),
+    default="rest",
+    show_default=True,
+    help="The state in which the law's fibres lie as given.",
+)
+@click.option(
+    "--solver",
+    type=click.Choice(("auto", "gmres", "direct")),
+    default="auto",
+    show_default=True,
+    help="Of the inverse's linear systems: GMRES, or LU always.",
 )
 @click.option(
     "--check/--no-check",
@@ -78,12 +93,9 @@ _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwi
 def rest_shape(
     run: Run,
     loaded: Path,
-    method: str,
-    density_of: str,
     check: bool,
-    check_overlap: bool,
     allow_energy_files: bool,
-    **mesh_options: Any,
+    **given: Any,
 ) -> None:
     r"""Find the shape without loads of a body that is given as loaded.
 
@@ -106,14 +118,10 @@ def rest_shape(
 
     run.out_or(Path("out") / loaded.stem)
     run.progress("reading")
-    case, allowed = _case(loaded, mesh_options, allow_energy_files)
+    asked = {name: given.pop(name) for name in _ASKED}
+    case, allowed = _case(loaded, given, allow_energy_files)
     body, settings = read_body(case, allow_energy_files=allowed)
     run.progress("compiling")
-    asked: dict[str, Any] = {
-        "method": method,
-        "density_of": density_of,
-        "check_overlap": check_overlap,
-    }
     watch = _report.progress(run, "rest shape")
     try:
         rest = body.rest_shape(progress=watch, **asked, **settings)
@@ -121,11 +129,12 @@ def rest_shape(
         _failure.leave(run, error, body.mesh)
         raise
     run.replaces(_failure.FILES)
-    run.result |= asked | {"approximate": method == "reversed-gravity", "size_m": body.mesh.size}
+    run.result |= asked | {"approximate": rest.method == "reversed-gravity"}
+    run.result["size_m"] = body.mesh.size
     _report.equilibrium(run, rest, body.mesh, "rest.vtu")
     rest.write_loaded(run.path("loaded.vtu"))
     if check:
-        _check(run, body, rest, density_of, settings)
+        _check(run, rest, settings)
 
 
 def _case(loaded: Path, mesh_options: dict[str, Any], allow_energy_files: bool) -> tuple[Any, bool]:
@@ -142,14 +151,12 @@ def _case(loaded: Path, mesh_options: dict[str, Any], allow_energy_files: bool) 
     return read_case(loaded), allow_energy_files
 
 
-def _check(run: Run, body: Body, rest: Rest, density_of: str, settings: dict[str, Any]) -> None:
-    """Load the rest shape again; what is farther off than `CLOSES` makes the result doubtful."""
-    from ..rest_check import round_trip
+def _check(run: Run, rest: Rest, settings: dict[str, Any]) -> None:
+    """Load the rest shape again; one that does not come back makes the result doubtful."""
     from . import _report
 
-    watch = _report.progress(run, "loading again")
     try:
-        found = round_trip(body, rest, density_of, progress=watch, **settings)
+        found = rest.round_trip(progress=_report.progress(run, "loading again"), **settings)
     except ConvergenceError as error:
         run.result["check"] = {"passed": False, "cause": error.cause}
         run.doubt(f"loaded again, the rest shape does not come back: {error}")
