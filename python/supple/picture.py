@@ -69,9 +69,9 @@ def draw(
     file = Path(path)
     if file.suffix not in (".png", ".svg") or not panels:
         raise InputError(f"a picture needs panels and a name in .png or .svg, got {file.name}.")
-    figure = Figure(figsize=(3.7 * len(panels) + 0.3, 3.8), dpi=100, layout="constrained")
+    figure = Figure(figsize=(3.7 * len(panels) + 0.3, 3.8), dpi=100)
     FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=0.12)
+    figure.set_layout_engine("constrained", w_pad=0.12)
     box = _box(panels)
     for number, panel in enumerate(panels, start=1):
         axes: Any = figure.add_subplot(
