@@ -270,6 +270,7 @@ class Body:
         max_iterations: int = 25,
         solver: str = "auto",
         progress: Progress | None = None,
+        check_overlap: bool = False,
         **fixed_point_options: Any,
     ) -> Rest:
         """The shape without the loads, taking the mesh for the loaded shape.
@@ -288,6 +289,8 @@ class Body:
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
             solver: of the inverse's unsymmetric tangents: "gmres" on few symmetric factorisations,
                 LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres".
+            check_overlap: refuse a rest shape of which two parts are in one place
+                (`supple.overlap.overlapping`); one with cells inside out is always refused.
             **fixed_point_options: of the methods of "sellier": `fixed_point.FixedPoint`.
 
         Raises:
@@ -297,7 +300,7 @@ class Body:
         """
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         asked = rest_shape.Request(
-            method, density_of, directions_of, solver, settings, fixed_point_options
+            method, density_of, directions_of, solver, check_overlap, settings, fixed_point_options
         )
         return rest_shape.find(self, asked, start)
 
@@ -322,7 +325,7 @@ class Body:
     # Inside
 
     def _weighed_in(self, state: str) -> Body:
-        """A copy whose density counts at rest, or whose nodes have the masses of the loaded shape."""
+        """A copy whose density counts at rest, or with nodes of the masses of the loaded shape."""
         body = self.on(self.mesh)
         if state == "loaded" and body._description.masses is None:
             body._description.masses = terms.nodal_masses(self._description)

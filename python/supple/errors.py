@@ -30,6 +30,7 @@ class ConvergenceError(SuppleError):
         cells: ids of the worst cells, worst first (may be empty).
         load_factor: largest fraction of the load that was in equilibrium, 0 to 1.
         cause: likely cause, one phrase.
+        points: (n, 3) m, the nodes in the last equilibrium that was reached; None if there is none.
     """
 
     def __init__(
@@ -39,9 +40,11 @@ class ConvergenceError(SuppleError):
         cells: Sequence[int] = (),
         load_factor: float = 0.0,
         cause: str = "",
+        points: Any = None,
     ) -> None:
         super().__init__(message)
         self.history = list(history)
         self.cells = list(cells)
         self.load_factor = load_factor
         self.cause = cause
+        self.points = points

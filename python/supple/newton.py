@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .core import core
 from .errors import ConvergenceError, InputError, MeshError
+from .mesh_jacobian import smallest_jacobian
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -119,9 +120,19 @@ def require_usable(rest: Rest) -> None:
             f"{cause}: the shape found has cells that are inside out at their corners; "
             "try a smaller load, a stiffer material, a skin or a finer mesh.",
             history=rest.history,
+            cells=inverted(rest),
             load_factor=1.0,
             cause=cause,
+            points=rest.points,
         ) from None
+
+
+def inverted(rest: Rest) -> list[int]:
+    """Cells of the rest shape that are inside out or flat at a corner, worst first."""
+    mesh = rest.loaded
+    smallest = smallest_jacobian(rest.points, mesh.cells, mesh.table)
+    worst = np.argsort(smallest, kind="stable")
+    return [int(c) for c in worst if smallest[c] <= 0]
 
 
 def worst_cells(result: Any, built: Built, description: Description, count: int = 5) -> list[int]:

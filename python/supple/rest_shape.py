@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from . import directions, fixed_point, newton, terms
+from . import directions, fixed_point, newton, overlap, terms
+from .choices import FIXED_POINTS, METHODS, SOLVERS, STATES
 from .errors import InputError
 from .newton import Settings
 from .state import Rest, outcome
 
 if TYPE_CHECKING:
     from .body import Body
-
-METHODS = ("inverse", "reversed-gravity", *fixed_point.METHODS)
-SOLVERS = ("auto", "gmres", "direct")
-STATES = ("rest", "loaded")
 
 
 @dataclass(frozen=True)
@@ -30,6 +27,7 @@ class Request:
     density_of: str
     directions_of: str
     solver: str
+    check_overlap: bool
     settings: Settings
     options: dict[str, Any] = field(default_factory=dict)  # of a fixed point
 
@@ -51,14 +49,18 @@ def find(body: Body, asked: Request, start: Rest | None) -> Rest:
     if start is not None and not isinstance(start, Rest):
         raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
     if asked.directions_of == "rest" or not directions.has_any(body):
-        return _find(body, asked, start)
-    mirrored = asked.method == "reversed-gravity"
-    return directions.rest_of_loaded(body, start, lambda b, s: _find(b, asked, s), mirrored)
+        rest = _find(body, asked, start)
+    else:
+        mirrored = asked.method == "reversed-gravity"
+        rest = directions.rest_of_loaded(body, start, lambda b, s: _find(b, asked, s), mirrored)
+    if asked.check_overlap:
+        overlap.require_apart(rest.mesh)
+    return rest
 
 
 def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
     """With the body's directions those at rest."""
-    if asked.method in fixed_point.METHODS:
+    if asked.method in FIXED_POINTS:
         chosen = fixed_point.options(asked.options, asked.method)
         rest = fixed_point.rest_shape(
             body, asked.method, asked.settings, chosen, asked.density_of, start

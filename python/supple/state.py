@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from . import terms
 from .errors import InputError
+from .prestress import Prestress, prestress, write_loaded
 from .projection import to_nodes
 
 if TYPE_CHECKING:
@@ -139,6 +140,10 @@ class Equilibrium:
         deviator = sigma - mean * np.eye(3)
         return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))))
 
+    def prestress(self, at: str = "cells") -> Prestress:
+        """F, J and σ of the loaded shape together, ``at`` as in `deformation_gradient`."""
+        return prestress(self, at)
+
     def write(self, path: str | Path, cell_data: Mapping[str, npt.ArrayLike] | None = None) -> Path:
         """Write the moved shape as VTU with displacement, J and von Mises stress.
 
@@ -236,6 +241,15 @@ class Rest(Equilibrium):
         takes the loaded shape again.
         """
         return self._body.on(self.mesh)
+
+    def write_loaded(self, path: str | Path) -> Path:
+        """Write the loaded shape as VTU with what it carries: where a later simulation starts.
+
+        For each cell F (from rest to loaded) and the Cauchy stress as tensors, nine columns row by
+        row as ParaView reads them, J and von Mises stress: averages by rest volume as of
+        `prestress`. For each node the displacement to the rest shape, and a mixed form's pressure.
+        """
+        return write_loaded(self, path)
 
 
 def outcome(

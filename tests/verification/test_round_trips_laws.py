@@ -100,7 +100,7 @@ def attempt(solve, load, start):
         return None
 
 
-@pytest.mark.parametrize("unit", units())
+@pytest.mark.parametrize("unit", list(units()))
 def test_there_and_back(unit):
     """rest_shape ∘ solve and solve ∘ rest_shape = identity to 1e-9 of the size."""
     body = block(unit)
