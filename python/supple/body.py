@@ -171,6 +171,9 @@ class Body:
     ) -> Body:
         """Hold the nodes of ``where`` to a rigid surface, free to slide on it.
 
+        A rest shape and a solve on it come back to the shape given but for the depth to which the
+        nodes sink in, compliance × force.
+
         Args:
             compliance: m/N of the whole region, shared by tributary area; of each node if
                 ``per_node`` (Mazier 2022 uses 1e-8 m/N).
