@@ -117,7 +117,7 @@ void bind_newton(py::module_& module) {
       .def_readwrite("size", &NewtonSettings::size)
       .def_readwrite("max_iterations", &NewtonSettings::max_iterations)
       .def_readwrite("load_steps", &NewtonSettings::load_steps)
-      .def_readwrite("smallest_step", &NewtonSettings::smallest_step)
+      .def_readwrite("follow", &NewtonSettings::follow)
       .def_readwrite("refuse_inversion", &NewtonSettings::refuse_inversion)
       .def_readwrite("warm", &NewtonSettings::warm);
   py::class_<Iteration>(module, "Iteration")
@@ -132,6 +132,7 @@ void bind_newton(py::module_& module) {
       .def_readonly("outcome", &NewtonResult::outcome)
       .def_readonly("u", &NewtonResult::u)
       .def_readonly("load_factor", &NewtonResult::load_factor)
+      .def_readonly("fold", &NewtonResult::fold)
       .def_readonly("residual", &NewtonResult::residual)
       .def_readonly("history", &NewtonResult::history)
       .def_readonly("worst", &NewtonResult::worst)
@@ -149,15 +150,19 @@ void bind_system(py::module_& module) {
       .def_readonly("assembly", &supple::Timings::assembly)
       .def_readonly("factor", &supple::Timings::factor)
       .def_readonly("solve", &supple::Timings::solve)
-      .def_readonly("total", &supple::Timings::total);
+      .def_readonly("total", &supple::Timings::total)
+      .def_readonly("factorisations", &supple::Timings::factorisations)
+      .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
-        return std::make_unique<System>(std::make_shared<const Vector>(std::move(points)),
+        return std::make_unique<System>(std::make_shared<Vector>(std::move(points)),
                                         std::move(home));
       }))
       .def_property_readonly("scalars", &System::scalars)
       .def("add", &System::add)
+      .def("move_points", &System::move_points)
       .def("set_free", &System::set_free)
+      .def("use_gmres", &System::use_gmres)
       .def("energy", &System::energy)
       .def("residual", &System::residual)
       .def("external", &System::external)

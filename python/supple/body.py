@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import directions, newton, parameters, supports, terms
-from .errors import InputError, MaterialError
+from . import body_checks as checks
+from . import newton, parameters, rest_shape, supports, terms
+from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
@@ -20,13 +21,10 @@ from .state import Equilibrium, Rest, State, outcome
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from .kernels.law import Law
     from .mesh import Mesh
     from .surface import Surface
 
 Floats = npt.NDArray[np.float64]
-
-METHODS = ("inverse", "reversed-gravity")
 
 
 class Body:
@@ -58,8 +56,8 @@ class Body:
         **values: Any,
     ) -> None:
         law, count = read_law(material), len(mesh.cells)
-        _require_offered(formulation, mesh.element)
-        _require_split(law, formulation)
+        checks.require_offered(formulation, mesh.element)
+        checks.require_split(law, formulation)
         region = terms.Region(law, np.arange(count), parameters.defaults(law, count))
         region.values |= parameters.given(law, values, count)
         rho = parameters.per_cell("density", density, count)
@@ -72,7 +70,7 @@ class Body:
             rho,
             np.zeros(3),
             np.zeros((n, 3)),
-            _degree(mesh, quadrature),
+            checks.degree(mesh, quadrature),
             formulation,
         )
         self._fixed = np.zeros((n, 3), dtype=bool)
@@ -89,7 +87,7 @@ class Body:
     def region(self, cells: CellWhere, material: str | Path, **values: Any) -> Body:
         """Another law on some cells: a mask, ids or a tag. Values as in the constructor."""
         d, law = self._description, read_law(material)
-        _require_split(law, d.formulation)
+        checks.require_split(law, d.formulation)
         ids = self.mesh.cell_ids(cells)
         new = terms.Region(law, ids, parameters.defaults(law, len(ids)))
         new.values |= parameters.given(law, values, len(ids))
@@ -191,7 +189,9 @@ class Body:
         """Add ``force``, N, on the nodes of ``where``: (3,) on each, or one row a node."""
         forces, nodes = self._description.forces.copy(), self.mesh.nodes(where)
         rows = np.ndim(force) == 2
-        forces[nodes] += _rows("force", force, len(nodes)) if rows else _vector("force", force)
+        forces[nodes] += (
+            checks.rows("force", force, len(nodes)) if rows else checks.vector("force", force)
+        )
         self._description.forces = forces
         return self
 
@@ -199,7 +199,7 @@ class Body:
         """Add a dead traction (3,) Pa on the facets of ``where``, per "rest" or "loaded" area."""
         if per not in ("rest", "loaded"):
             raise InputError(f'per must be "rest" or "loaded", got {per!r}.')
-        load = terms.FacetLoad(self.mesh.boundary(where), _vector("traction", traction), per)
+        load = terms.FacetLoad(self.mesh.boundary(where), checks.vector("traction", traction), per)
         self._description.tractions.append(load)
         return self._restructured()
 
@@ -213,7 +213,7 @@ class Body:
 
     def gravity(self, g: npt.ArrayLike) -> Body:
         """Set the acceleration of gravity (3,), m/s²."""
-        self._description.gravity = _vector("gravity", g)
+        self._description.gravity = checks.vector("gravity", g)
         return self
 
     def clear_loads(self) -> Body:
@@ -271,13 +271,16 @@ class Body:
         rtol: float = 1e-10,
         atol: float | None = None,
         max_iterations: int = 25,
+        solver: str = "auto",
         progress: Progress | None = None,
+        **fixed_point_options: Any,
     ) -> Rest:
         """The shape without the loads, taking the mesh for the loaded shape.
 
         Args:
-            method: "inverse" (exact, one solve) or "reversed-gravity" (approximate: the loads act
-                the other way on the loaded shape; Mazier 2022, chapter 5).
+            method: "inverse" (exact, one solve); "sellier", "sellier-aitken", "sellier-anderson"
+                (forward solves until the loaded shape is met); or "reversed-gravity" (approximate:
+                the loads act the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
             directions_of: the state, "rest" or "loaded", in which the laws' directions (fibres) lie
                 as given. An image of the loaded shape shows "loaded" ones; those at rest are then
@@ -286,48 +289,20 @@ class Body:
             start: a rest shape of this mesh to start from, as after a small change of the body;
                 from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
+            solver: of the inverse's unsymmetric tangents: "gmres" on few symmetric factorisations,
+                LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres".
+            **fixed_point_options: of the methods of "sellier": `fixed_point.FixedPoint`.
 
         Raises:
             InputError: as in `solve`.
             ConvergenceError: there is no such rest shape, or none was found, with the cause; or
                 the directions at rest do not settle.
         """
-        if method not in METHODS:
-            raise InputError(f"method must be one of {METHODS}, got {method!r}.")
-        if density_of not in ("rest", "loaded"):
-            raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
-        if directions_of not in ("rest", "loaded"):
-            raise InputError(
-                f'directions_of must be "rest" or "loaded", the shape in which the directions of '
-                f"the laws lie as given; got {directions_of!r}."
-            )
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
-        if start is not None and not isinstance(start, Rest):
-            raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
-        if directions_of == "loaded" and directions.has_any(self):
-            return directions.rest_of_loaded(
-                self,
-                start,
-                lambda body, start: body.rest_shape(
-                    method, density_of, "rest", start, load_steps, rtol, atol, max_iterations,
-                    progress,
-                ),
-                mirrored=method == "reversed-gravity",
-            )  # fmt: skip
-        begin = None if start is None else self._start(start)
-        if method == "inverse":
-            result, built = self._run(settings, begin, inverse=True, density_of=density_of)
-        else:
-            result, built = self._reversed()._run(settings, begin)
-        newton.require_converged(result, built, self._description, inverse=True)
-        solved = terms.snapshot(self._description)
-        fields = outcome(result, built, self._description, self._fixed)
-        body = self.on(self.mesh)
-        if density_of == "loaded" and body._description.masses is None:
-            body._description.masses = terms.nodal_masses(solved)
-        rest = Rest(**fields, _solved=solved, _form="inverse", method=method, _body=body)
-        newton.require_usable(rest)
-        return rest
+        asked = rest_shape.Request(
+            method, density_of, directions_of, solver, settings, fixed_point_options
+        )
+        return rest_shape.find(self, asked, start)
 
     def on(self, mesh: Mesh) -> Body:
         """The same laws, supports and loads on a moved copy of the mesh, such as ``rest.mesh``."""
@@ -349,6 +324,13 @@ class Body:
 
     # Inside
 
+    def _weighed_in(self, state: str) -> Body:
+        """A copy, its density that at rest or its nodes with the masses of the loaded shape."""
+        body = self.on(self.mesh)
+        if state == "loaded" and body._description.masses is None:
+            body._description.masses = terms.nodal_masses(self._description)
+        return body
+
     def _reversed(self) -> Body:
         body = self.on(self.mesh)
         d = body._description
@@ -364,6 +346,7 @@ class Body:
         start: Floats | None = None,
         inverse: bool = False,
         density_of: str = "rest",
+        gmres: bool = False,
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
         native.warm = start is not None
@@ -374,6 +357,7 @@ class Body:
         native.refuse_inversion = inverse or len(barriers) < len(laws)
         scalars = np.zeros(built.system.scalars)
         built.system.set_free(np.append(~self._fixed.ravel(), scalars == 0))
+        built.system.use_gmres(gmres)
         built.system.reset_timings()
         target = np.append(-self._prescribed if inverse else self._prescribed, scalars)
         if start is None:
@@ -472,49 +456,3 @@ def assemble(
         return energy, residual.reshape(-1, 3), tangent
     unit = np.append(np.ones(n), np.full(flat.size - n, 1 / built.scalar_unit))
     return energy, unit * residual, csr_array(diags_array(unit) @ tangent @ diags_array(unit))
-
-
-def _require_offered(formulation: str, element: str) -> None:
-    from .kernels.unit import OFFERED
-
-    if formulation not in OFFERED:
-        raise InputError(f"formulation must be one of {tuple(OFFERED)}, got {formulation!r}.")
-    if element not in OFFERED[formulation]:
-        raise InputError(
-            f"formulation {formulation!r} wants a mesh of {' or '.join(OFFERED[formulation])}, "
-            f"got {element}; use another mesh (elevated() gives P2, Q2L) or another formulation."
-        )
-
-
-def _require_split(law: Law, formulation: str) -> None:
-    if formulation != "displacement" and not law.is_split:
-        raise MaterialError(
-            f"formulation {formulation!r} needs a law with psi_dev and psi_vol, and {law.name} "
-            'gives psi as a whole; use formulation "displacement" or another law.'
-        )
-
-
-def _degree(mesh: Mesh, quadrature: int | tuple[int, str] | None) -> int | None:
-    """The rule that was asked for, checked before anything is compiled."""
-    from .kernels.degree import checked
-
-    if quadrature is None:
-        return None
-    try:
-        return checked(quadrature, mesh.table.cell.name)
-    except ValueError as problem:
-        raise InputError(str(problem)) from None
-
-
-def _vector(name: str, value: npt.ArrayLike) -> Floats:
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{name} must be three numbers, got {value!r}.")
-    return vector
-
-
-def _rows(name: str, value: npt.ArrayLike, count: int) -> Floats:
-    rows = np.asarray(value, dtype=float)
-    if rows.shape != (count, 3) or not np.isfinite(rows).all():
-        raise InputError(f"{name} must be finite with shape ({count}, 3), got {rows.shape}.")
-    return rows

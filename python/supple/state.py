@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+#: Keys of `Equilibrium.timings`: seconds, then counts.
+PHASES = ("assembly", "factor", "solve", "total", "factorisations", "krylov_iterations")
+
 
 @dataclass(frozen=True)
 class PointValues:
@@ -41,7 +44,8 @@ class Equilibrium:
         u: (n, 3) displacement of the nodes of the mesh that was solved on, m.
         iterations: Newton iterations over all load steps.
         history: one dict an iteration.
-        timings: seconds of "assembly", "factor", "solve", "total".
+        timings: seconds of "assembly", "factor", "solve", "total"; how many "factorisations" and
+            "krylov_iterations" there were.
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
@@ -199,10 +203,19 @@ class Rest(Equilibrium):
     """The shape without loads, from a loaded one (Mazier 2022, chapter 3); ``u`` is X - x.
 
     Attributes:
-        method: "inverse" is exact; "reversed-gravity" is an approximation to compare with.
+        method: "inverse" is exact; "reversed-gravity" is an approximation to compare with; those
+            of "sellier" are as exact as they were asked to be.
+        density_of: the state, "rest" or "loaded", that the density counts in.
+        solves: forward solves that a method of "sellier" took, else 0; ``iterations``,
+            ``history`` and ``timings`` are over all of them.
+        misses: after each of its steps the largest distance of a node from where it should be, as
+            a share of the size.
     """
 
     method: str = "inverse"
+    density_of: str = "rest"
+    solves: int = 0
+    misses: tuple[float, ...] = ()
     _body: Body = field(repr=False, kw_only=True)  # on the loaded shape, with what is its at rest
 
     @property
@@ -238,7 +251,7 @@ def outcome(
         "pressure": _pressure(result.u[fixed.size :] * built.scalar_unit, d),
         "iterations": sum(1 for i in result.history if i.iteration > 0),
         "history": [as_dict(i) for i in result.history],
-        "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
+        "timings": {n: getattr(t, n) for n in PHASES},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
         "warnings": _warnings(built.system.volume_ratio(result.u)),

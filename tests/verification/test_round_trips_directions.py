@@ -215,14 +215,3 @@ def test_a_skin_with_directions_is_refused():
     body = supple.Body(supple.Mesh.box((1, 1, 1), (EDGE,) * 3), "neo_hookean")
     with pytest.raises(supple.MaterialError, match="guccione has a direction, fibre"):
         body.skin(lambda p: p[:, 0] > -1, "guccione", thickness=1e-3)
-
-
-@pytest.mark.parametrize("depth", [1, 3])
-def test_mixing_solves_a_linear_iteration_in_as_many_steps_as_it_remembers(depth):
-    """x ← A x + b with A of rank ``depth``: exact after depth + 2 images (Walker and Ni 2011)."""
-    rng = np.random.default_rng(3)
-    A = 0.3 * rng.standard_normal((6, depth)) @ rng.standard_normal((depth, 6))
-    b, x, mix = rng.standard_normal(6), np.zeros(6), directions.Mixture(depth)
-    for _ in range(depth + 2):
-        x = mix.next(x, A @ x + b)
-    np.testing.assert_allclose(x, np.linalg.solve(np.eye(6) - A, b), rtol=1e-9, atol=1e-9)

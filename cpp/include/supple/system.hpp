@@ -4,21 +4,23 @@
 #include <memory>
 #include <vector>
 
+#include "supple/inverse_solver.hpp"
 #include "supple/linear.hpp"
 #include "supple/term.hpp"
 
 namespace supple {
 
-/// Seconds spent in the phases of a solve.
+/// Seconds spent in the phases of a solve, and how often its costly parts were done.
 struct Timings {
   double assembly = 0.0, factor = 0.0, solve = 0.0, total = 0.0;
+  int factorisations = 0, krylov_iterations = 0;
 };
 
 class System {
  public:
   /// @param points (3n) coordinates of the mesh, m, node-major.
   /// @param home (scalars) the node whose neighbours each scalar unknown shares.
-  explicit System(std::shared_ptr<const Vector> points, std::vector<Index> home = {})
+  explicit System(std::shared_ptr<Vector> points, std::vector<Index> home = {})
       : points_(std::move(points)), home_(std::move(home)) {}
 
   /// Add a term; the pattern is made anew at the next use.
@@ -27,9 +29,16 @@ class System {
   /// @throws ShapeError on a wrong size.
   void set_free(Mask free);
 
+  /// Solve with unsymmetric tangents, which are those of an inverse form, by GMRES instead of LU.
+  void use_gmres(bool gmres);
+
   Index scalars() const { return static_cast<Index>(home_.size()); }
   Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
-  const std::shared_ptr<const Vector>& points() const { return points_; }
+  std::shared_ptr<const Vector> points() const { return points_; }
+  /// Move the mesh under all terms of a direct system; pattern and symbolic factors stay. What a
+  /// term keeps of the old points goes when its fields are set anew, as they must be.
+  /// @throws ShapeError on a wrong size.
+  void move_points(const ConstVector& points);
   /// All terms have a potential, so energy() is that of residual().
   bool has_energy() const;
   /// By the origin of the terms: Unsymmetric where one is, QuasiDefinite with scalars, else
@@ -54,7 +63,9 @@ class System {
   /// The same without asking it to be positive definite (symmetric kinds only).
   FactorStatus factorise_indefinite();
   /// x (dofs), 0 at fixed ones, from the last factor; `rhs` (dofs).
-  Vector solve(const ConstVector& rhs);
+  /// @param tolerance of the residual over that of x = 0, which GMRES need not fall below.
+  /// x is not finite where GMRES and then LU found the tangent singular.
+  Vector solve(const ConstVector& rhs, double tolerance = 1e-10);
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
   /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only); of a
@@ -64,7 +75,12 @@ class System {
   Timings timings;
 
  private:
-  std::shared_ptr<const Vector> points_;
+  bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
+  FactorStatus prepare_inverse();
+  void count_work();
+  void forget_factors();
+
+  std::shared_ptr<Vector> points_;
   std::vector<Index> home_;
   std::vector<std::shared_ptr<Term>> terms_;
   Mask free_;
@@ -72,7 +88,10 @@ class System {
   std::unique_ptr<Reduction> reduction_;
   std::unique_ptr<Factor> factor_, indefinite_;
   Factor* current_ = nullptr; // the one that factorised last
+  std::unique_ptr<InverseSolver> inverse_;
+  bool gmres_ = false;
   Vector values_, reduced_;
+  Vector at_; // u of values_
 };
 
 } // namespace supple

@@ -1,0 +1,93 @@
+"""The rest shape of a loaded body: what was asked for, found by its method, and looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from . import directions, fixed_point, newton, terms
+from .errors import InputError
+from .newton import Settings
+from .state import Rest, outcome
+
+if TYPE_CHECKING:
+    from .body import Body
+
+METHODS = ("inverse", "reversed-gravity", *fixed_point.METHODS)
+SOLVERS = ("auto", "gmres", "direct")
+STATES = ("rest", "loaded")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked for; `Body.rest_shape` says what the names mean.
+
+    Raises:
+        InputError: a choice that there is not, or an option that the method does not take.
+    """
+
+    method: str
+    density_of: str
+    directions_of: str
+    solver: str
+    settings: Settings
+    options: dict[str, Any] = field(default_factory=dict)  # of a fixed point
+
+    def __post_init__(self) -> None:
+        _require_one("method", self.method, METHODS)
+        _require_one("density_of", self.density_of, STATES)
+        _require_one("directions_of", self.directions_of, STATES)
+        _require_one("solver", self.solver, SOLVERS)
+        fixed_point.options(self.options, self.method)
+
+
+def find(body: Body, asked: Request, start: Rest | None) -> Rest:
+    """The rest shape of ``body``.
+
+    Raises:
+        InputError: ``start`` is no rest shape of this mesh.
+        ConvergenceError: there is none, or none was found.
+    """
+    if start is not None and not isinstance(start, Rest):
+        raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
+    if asked.directions_of == "rest" or not directions.has_any(body):
+        return _find(body, asked, start)
+    mirrored = asked.method == "reversed-gravity"
+    return directions.rest_of_loaded(body, start, lambda b, s: _find(b, asked, s), mirrored)
+
+
+def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
+    """With the body's directions those at rest."""
+    if asked.method in fixed_point.METHODS:
+        chosen = fixed_point.options(asked.options, asked.method)
+        rest = fixed_point.rest_shape(
+            body, asked.method, asked.settings, chosen, asked.density_of, start
+        )
+    else:
+        rest = _solved(body, asked, start)
+    newton.require_usable(rest)
+    return rest
+
+
+def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
+    """By one solve: of the inverse form, or with the loads reversed."""
+    begin = None if start is None else body._start(start)
+    if asked.method == "inverse":
+        gmres = asked.solver != "direct"
+        result, built = body._run(asked.settings, begin, True, asked.density_of, gmres)
+    else:
+        result, built = body._reversed()._run(asked.settings, begin)
+    newton.require_converged(result, built, body._description, inverse=True)
+    return Rest(
+        **outcome(result, built, body._description, body._fixed),
+        _solved=terms.snapshot(body._description),
+        _form="inverse",
+        method=asked.method,
+        density_of=asked.density_of,
+        _body=body._weighed_in(asked.density_of),
+    )
+
+
+def _require_one(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise InputError(f"{name} must be one of {choices}, got {value!r}.")
