@@ -169,6 +169,9 @@ class Body:
     ) -> Body:
         """Hold the nodes of ``where`` to a rigid surface, free to slide on it.
 
+        A rest shape and a solve on it come back to the shape given but for the depth to which the
+        nodes sink in, compliance × force.
+
         Args:
             compliance: m/N of the whole region, shared by tributary area; of each node if
                 ``per_node`` (Mazier 2022 uses 1e-8 m/N).
@@ -325,7 +328,7 @@ class Body:
     # Inside
 
     def _weighed_in(self, state: str) -> Body:
-        """A copy whose density counts at rest, or with nodes of the masses of the loaded shape."""
+        """A copy, its density that at rest or its nodes with the masses of the loaded shape."""
         body = self.on(self.mesh)
         if state == "loaded" and body._description.masses is None:
             body._description.masses = terms.nodal_masses(self._description)
