@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, parameters, supports, terms
+from . import failures, newton, parameters, supports, terms
 from .errors import InputError, MaterialError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
@@ -252,7 +252,7 @@ class Body:
             raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         result, built = self._run(settings, None if start is None else self._start(start))
-        newton.require_converged(result, built, self._description)
+        failures.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
         return State(
             **outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct"
@@ -295,11 +295,13 @@ class Body:
             result, built = self._run(settings, begin, inverse=True, density_of=density_of)
         else:
             result, built = self._reversed()._run(settings, begin)
-        newton.require_converged(result, built, self._description, inverse=True)
+        failures.require_converged(result, built, self._description, inverse=True)
         solved = terms.snapshot(self._description)
         fields = outcome(result, built, self._description, self._fixed)
         rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
-        newton.require_usable(rest)
+        failures.require_usable(rest)
+        if method == "inverse":
+            failures.require_stable(rest, self._unstable_directions(rest))
         return rest
 
     def on(self, mesh: Mesh) -> Body:
@@ -354,6 +356,17 @@ class Body:
         else:
             start[self._prescribed.size :] /= built.scalar_unit
         return newton.solve(built.system, start, target, native, settings), built
+
+    def _unstable_directions(self, rest: Rest) -> int:
+        """In which the loaded body on its rest shape buckles; 0 where loads without energy hide it."""
+        body = self.on(rest.mesh)
+        built = body._system()
+        if not built.system.has_energy():
+            return 0
+        u = unknowns(body, -rest.u, rest.pressure)
+        u[rest.u.size :] /= built.scalar_unit
+        built.system.set_free(np.append(~self._fixed.ravel(), np.ones(u.size - rest.u.size, bool)))
+        return int(built.system.unstable_directions(u))
 
     def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
         key = (inverse, density_of if inverse else "rest")
