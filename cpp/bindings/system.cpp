@@ -6,6 +6,7 @@
 #include "supple/kernel_term.hpp"
 #include "supple/newton.hpp"
 #include "supple/sliding.hpp"
+#include "supple/stability.hpp"
 
 namespace {
 
@@ -169,6 +170,11 @@ void bind_system(py::module_& module) {
       .def("volume_ratio", &System::volume_ratio)
       .def("tangent", &tangent)
       .def("has_energy", &System::has_energy)
+      .def("unstable_directions",
+           [](System& system, const Vector& u) {
+             const py::gil_scoped_release release;
+             return supple::unstable_directions(system, u);
+           })
       .def("reset_timings", [](System& system) { system.timings = {}; })
       .def_readonly("timings", &System::timings)
       .def("solve", &solve);

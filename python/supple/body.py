@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import body_checks as checks
-from . import newton, parameters, rest_shape, supports, terms
+from . import failures, newton, parameters, rest_shape, supports, terms
 from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
@@ -255,7 +255,7 @@ class Body:
             raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         result, built = self._run(settings, None if start is None else self._start(start))
-        newton.require_converged(result, built, self._description)
+        failures.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
         return State(
             **outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct"
@@ -368,6 +368,16 @@ class Body:
         else:
             start[self._prescribed.size :] /= built.scalar_unit
         return newton.solve(built.system, start, target, native, settings), built
+
+    def _unstable_directions(self, u: Floats, pressure: Floats | None) -> int:
+        """In which the loaded body buckles at ``u``; 0 where loads without energy hide it."""
+        built = self._system()
+        if not built.system.has_energy():
+            return 0
+        at = unknowns(self, u, pressure)
+        at[u.size :] /= built.scalar_unit
+        built.system.set_free(np.append(~self._fixed.ravel(), np.ones(at.size - u.size, bool)))
+        return int(built.system.unstable_directions(at))
 
     def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
         key = (inverse, density_of if inverse else "rest")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, terms
+from . import failures, newton, terms
 from .acceleration import Acceleration, Aitken, Anderson, Relaxation
 from .choices import FIXED_POINTS
 from .errors import ConvergenceError, InputError, MeshError
@@ -137,7 +137,7 @@ class Forward:
             self.timings[name] += getattr(built.system.timings, name)
         rows = [newton.as_dict(i) | {"solve": float(self.solves)} for i in result.history]
         self.history += rows
-        newton.require_converged(result, built, body._description)
+        failures.require_converged(result, built, body._description)
         flat, n = result.u, self.target.size
         self._scalars = flat[n:] * built.scalar_unit
         points = body.mesh.points

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from . import directions, fixed_point, newton, overlap, terms
+from . import directions, failures, fixed_point, overlap, terms
 from .choices import FIXED_POINTS, METHODS, SOLVERS, STATES
 from .errors import InputError
 from .newton import Settings
@@ -67,8 +67,15 @@ def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
         )
     else:
         rest = _solved(body, asked, start)
-    newton.require_usable(rest)
+    failures.require_usable(rest)
+    if asked.method == "inverse":  # the others come from solves that refuse what is unstable
+        failures.require_stable(rest, _unstable_directions(rest))
     return rest
+
+
+def _unstable_directions(rest: Rest) -> int:
+    """In which the loaded body on its rest shape buckles; 0 where loads without energy hide it."""
+    return rest.body()._unstable_directions(-rest.u, rest.pressure)
 
 
 def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
@@ -79,7 +86,7 @@ def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
         result, built = body._run(asked.settings, begin, True, asked.density_of, gmres)
     else:
         result, built = body._reversed()._run(asked.settings, begin)
-    newton.require_converged(result, built, body._description, inverse=True)
+    failures.require_converged(result, built, body._description, inverse=True)
     return Rest(
         **outcome(result, built, body._description, body._fixed),
         _solved=terms.snapshot(body._description),

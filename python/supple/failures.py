@@ -1,0 +1,131 @@
+"""Why a solve stopped without a result, in words: cause, how far it came, what could change it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import ConvergenceError, MeshError
+from .mesh_jacobian import smallest_jacobian
+from .newton import as_dict
+
+if TYPE_CHECKING:
+    from .state import Rest
+    from .terms import Built, Description
+
+_CAUSES = {
+    "unstable": "unstable equilibrium: a small push leaves it (buckling)",
+    "inverted": "collapsed cell: the load presses it flat before the whole load is on",
+    "singular": "singular stiffness: a part is not held or has no stiffness",
+    "limit_point": "limit point: the path of equilibria turns back before the whole load is on",
+    "stalled": "the path of equilibria is lost before the whole load is on",
+}
+_CAUSES_INVERSE = {
+    "unstable": "no rest shape that would bear the load: the given shape is unstable on it",
+    "inverted": "no rest shape: a cell collapses on the way to it (too soft for this load)",
+    "limit_point": "no rest shape: the way to it ends at a limit point (too soft for this load)",
+    "stalled": "no rest shape was found: the way to it ends before the whole load is off",
+}
+
+
+def require_converged(
+    result: Any, built: Built, description: Description, inverse: bool = False
+) -> None:
+    """Raise for a result that is no stable equilibrium under the whole load.
+
+    Raises:
+        ConvergenceError: cause, load factor, worst cells, history, points.
+    """
+    name = result.outcome.name
+    if name == "converged":
+        return
+    cause = (_CAUSES_INVERSE if inverse else {}).get(name, _CAUSES[name])
+    cells = worst_cells(result, built, description)
+    u = result.u[: description.mesh.points.size].reshape(-1, 3)
+    raise ConvergenceError(
+        f"no {'rest shape' if inverse else 'equilibrium'}: {cause}; "
+        f"{100 * result.load_factor:.4g} % of the load was reached, "
+        f"worst cells {cells[:3]}; {advice(name, result.load_factor)}.",
+        history=[as_dict(i) for i in result.history],
+        cells=cells,
+        load_factor=result.load_factor,
+        cause=cause,
+        points=description.mesh.points + u,
+    )
+
+
+def advice(outcome: str, reached: float) -> str:
+    """What could change a failure; forces over moduli are all that counts where both scale."""
+    if outcome == "singular":
+        return "hold every part, or give it stiffness"
+    if not 0 < reached < 1:
+        return "try a smaller load, a stiffer material or a finer mesh"
+    mesh = " or a finer mesh" if outcome in ("inverted", "stalled") else ""
+    return (
+        f"try moduli about {1.05 / reached:.3g} times as large, {100 * reached:.3g} % of the load, "
+        f"a stiffer skin{mesh}"
+    )
+
+
+def require_usable(rest: Rest) -> None:
+    """Refuse a rest shape with cells that are inside out between the quadrature points.
+
+    Raises:
+        ConvergenceError: the cells.
+    """
+    try:
+        _ = rest.mesh
+    except MeshError:
+        cause, mesh = _CAUSES_INVERSE["inverted"], rest.loaded
+        smallest = smallest_jacobian(rest.points, mesh.cells, mesh.table)
+        cells = np.argsort(smallest, kind="stable")[: min(5, int((smallest <= 0).sum()))]
+        raise ConvergenceError(
+            f"{cause}: the shape found has cells that are inside out at their corners, worst "
+            f"{cells[:3].tolist()}; try a smaller load, a stiffer material, a skin or a finer mesh.",
+            history=rest.history,
+            cells=cells.tolist(),
+            load_factor=1.0,
+            cause=cause,
+            points=rest.points,
+        ) from None
+
+
+def require_stable(rest: Rest, directions: int) -> None:
+    """Refuse a rest shape on which the loaded shape is an equilibrium that any push leaves.
+
+    A body cannot have been seen in it, and `Body.solve` refuses it too.
+
+    Raises:
+        ConvergenceError: with the shape that was found as its points.
+    """
+    if directions == 0:
+        return
+    cause = _CAUSES_INVERSE["unstable"]
+    raise ConvergenceError(
+        f"{cause} ({directions} directions of buckling); try a smaller load, a stiffer material, "
+        "more support or a finer mesh.",
+        history=rest.history,
+        load_factor=1.0,
+        cause=cause,
+        points=rest.points,
+    )
+
+
+def worst_cells(result: Any, built: Built, description: Description, count: int = 5) -> list[int]:
+    """Cells of the mesh: the most compressed one, then those around the largest residual."""
+    cells: list[int] = []
+    if result.worst.value <= 0:
+        terms = [
+            r for r, t in zip(description.regions, built.regions, strict=True) if t is not None
+        ]
+        cells.append(int(terms[result.worst.term].ids[result.worst.cell]))
+    if len(result.last_residual):
+        n = description.mesh.points.size
+        size: npt.NDArray[np.float64] = np.linalg.norm(
+            result.last_residual[:n].reshape(-1, 3), axis=1
+        )
+        around = np.nan_to_num(size, nan=np.inf)[description.mesh.cells].max(axis=1)
+        cells += [int(c) for c in np.argsort(-around, kind="stable")[:count] if c not in cells]
+    return cells[:count]
