@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import ConvergenceError, MeshError
+from .mesh_checks import some
 from .mesh_jacobian import smallest_jacobian
 from .newton import as_dict
 
@@ -78,18 +79,24 @@ def require_usable(rest: Rest) -> None:
     try:
         _ = rest.mesh
     except MeshError:
-        cause, mesh = _CAUSES_INVERSE["inverted"], rest.loaded
-        smallest = smallest_jacobian(rest.points, mesh.cells, mesh.table)
-        cells = np.argsort(smallest, kind="stable")[: min(5, int((smallest <= 0).sum()))]
+        cause, cells = _CAUSES_INVERSE["inverted"], inverted(rest)
         raise ConvergenceError(
-            f"{cause}: the shape found has cells that are inside out at their corners, worst "
-            f"{cells[:3].tolist()}; try a smaller load, a stiffer material, a skin or a finer mesh.",
+            f"{cause}: in the shape found cells {some(cells)} are inside out at their corners; "
+            "try a smaller load, a stiffer material, a skin or a finer mesh.",
             history=rest.history,
-            cells=cells.tolist(),
+            cells=cells,
             load_factor=1.0,
             cause=cause,
             points=rest.points,
         ) from None
+
+
+def inverted(rest: Rest) -> list[int]:
+    """Cells of the rest shape that are inside out or flat at a corner, worst first."""
+    mesh = rest.loaded
+    smallest = smallest_jacobian(rest.points, mesh.cells, mesh.table)
+    worst = np.argsort(smallest, kind="stable")
+    return [int(c) for c in worst if smallest[c] <= 0]
 
 
 def require_stable(rest: Rest, directions: int) -> None:
