@@ -152,11 +152,12 @@ void bind_system(py::module_& module) {
       .def_readonly("total", &supple::Timings::total);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
-        return std::make_unique<System>(std::make_shared<const Vector>(std::move(points)),
+        return std::make_unique<System>(std::make_shared<Vector>(std::move(points)),
                                         std::move(home));
       }))
       .def_property_readonly("scalars", &System::scalars)
       .def("add", &System::add)
+      .def("move_points", &System::move_points)
       .def("set_free", &System::set_free)
       .def("energy", &System::energy)
       .def("residual", &System::residual)

@@ -37,6 +37,11 @@ void System::add(std::shared_ptr<Term> term) {
   indefinite_.reset();
 }
 
+void System::move_points(const ConstVector& points) {
+  require_size("points", points.size(), static_cast<Index>(points_->size()), "three a node");
+  *points_ = points;
+}
+
 void System::set_free(Mask free) {
   require_size("free", free.size(), dofs(), "one entry for each dof");
   if (free_.size() == free.size() && (free_ == free).all()) return;

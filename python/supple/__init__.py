@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from .laws import materials as materials
     from .mesh import Mesh as Mesh
     from .mesh import Tag as Tag
+    from .round_trip import reversed_gravity_error as reversed_gravity_error
+    from .round_trip import round_trip_error as round_trip_error
     from .state import Rest as Rest
     from .state import State as State
     from .surface import Surface as Surface
@@ -39,6 +41,8 @@ _HOME = {
     "fit": "author.fit",
     "material": "laws",
     "materials": "laws",
+    "reversed_gravity_error": "round_trip",
+    "round_trip_error": "round_trip",
     "sensitivity": "sensitivity",
 }
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, parameters, supports, terms
-from .errors import InputError, MaterialError
+from . import body_checks as checks
+from . import fixed_point, newton, parameters, supports, terms
+from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
@@ -20,13 +21,12 @@ from .state import Rest, State, outcome
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from .kernels.law import Law
     from .mesh import Mesh
     from .surface import Surface
 
 Floats = npt.NDArray[np.float64]
 
-METHODS = ("inverse", "reversed-gravity")
+METHODS = ("inverse", "reversed-gravity", *fixed_point.METHODS)
 
 
 class Body:
@@ -58,8 +58,8 @@ class Body:
         **values: Any,
     ) -> None:
         law, count = read_law(material), len(mesh.cells)
-        _require_offered(formulation, mesh.element)
-        _require_split(law, formulation)
+        checks.require_offered(formulation, mesh.element)
+        checks.require_split(law, formulation)
         region = terms.Region(law, np.arange(count), parameters.defaults(law, count))
         region.values |= parameters.given(law, values, count)
         rho = parameters.per_cell("density", density, count)
@@ -72,7 +72,7 @@ class Body:
             rho,
             np.zeros(3),
             np.zeros((n, 3)),
-            _degree(mesh, quadrature),
+            checks.degree(mesh, quadrature),
             formulation,
         )
         self._fixed = np.zeros((n, 3), dtype=bool)
@@ -89,7 +89,7 @@ class Body:
     def region(self, cells: CellWhere, material: str | Path, **values: Any) -> Body:
         """Another law on some cells: a mask, ids or a tag. Values as in the constructor."""
         d, law = self._description, read_law(material)
-        _require_split(law, d.formulation)
+        checks.require_split(law, d.formulation)
         ids = self.mesh.cell_ids(cells)
         new = terms.Region(law, ids, parameters.defaults(law, len(ids)))
         new.values |= parameters.given(law, values, len(ids))
@@ -188,7 +188,9 @@ class Body:
         """Add ``force``, N, on the nodes of ``where``: (3,) on each, or one row a node."""
         forces, nodes = self._description.forces.copy(), self.mesh.nodes(where)
         rows = np.ndim(force) == 2
-        forces[nodes] += _rows("force", force, len(nodes)) if rows else _vector("force", force)
+        forces[nodes] += (
+            checks.rows("force", force, len(nodes)) if rows else checks.vector("force", force)
+        )
         self._description.forces = forces
         return self
 
@@ -196,7 +198,7 @@ class Body:
         """Add a dead traction (3,) Pa on the facets of ``where``, per "rest" or "loaded" area."""
         if per not in ("rest", "loaded"):
             raise InputError(f'per must be "rest" or "loaded", got {per!r}.')
-        load = terms.FacetLoad(self.mesh.boundary(where), _vector("traction", traction), per)
+        load = terms.FacetLoad(self.mesh.boundary(where), checks.vector("traction", traction), per)
         self._description.tractions.append(load)
         return self._restructured()
 
@@ -210,7 +212,7 @@ class Body:
 
     def gravity(self, g: npt.ArrayLike) -> Body:
         """Set the acceleration of gravity (3,), m/s²."""
-        self._description.gravity = _vector("gravity", g)
+        self._description.gravity = checks.vector("gravity", g)
         return self
 
     def clear_loads(self) -> Body:
@@ -267,14 +269,17 @@ class Body:
         atol: float | None = None,
         max_iterations: int = 25,
         progress: Progress | None = None,
+        **fixed_point_options: Any,
     ) -> Rest:
         """The shape without the loads, taking the mesh for the loaded shape.
 
         Args:
-            method: "inverse" (exact, one solve) or "reversed-gravity" (approximate: the loads act
-                the other way on the loaded shape; Mazier 2022, chapter 5).
+            method: "inverse" (exact, one solve); "sellier", "sellier-aitken", "sellier-anderson"
+                (forward solves until the loaded shape is met); or "reversed-gravity" (approximate:
+                the loads act the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
+            **fixed_point_options: of the methods of "sellier": `fixed_point.FixedPoint`.
 
         Raises:
             InputError: as in `solve`.
@@ -285,6 +290,9 @@ class Body:
         if density_of not in ("rest", "loaded"):
             raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
+        chosen = fixed_point.options(fixed_point_options, method)
+        if method in fixed_point.METHODS:
+            return fixed_point.rest_shape(self, method, settings, chosen, density_of)
         if method == "inverse":
             result, built = self._run(settings, inverse=True, density_of=density_of)
         else:
@@ -292,7 +300,7 @@ class Body:
         newton.require_converged(result, built, self._description, inverse=True)
         solved = terms.snapshot(self._description)
         fields = outcome(result, built, self._description, self._fixed)
-        rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
+        rest = Rest(**fields, _solved=solved, _form="inverse", method=method, density_of=density_of)
         newton.require_usable(rest)
         return rest
 
@@ -439,49 +447,3 @@ def assemble(
         return energy, residual.reshape(-1, 3), tangent
     unit = np.append(np.ones(n), np.full(flat.size - n, 1 / built.scalar_unit))
     return energy, unit * residual, csr_array(diags_array(unit) @ tangent @ diags_array(unit))
-
-
-def _require_offered(formulation: str, element: str) -> None:
-    from .kernels.unit import OFFERED
-
-    if formulation not in OFFERED:
-        raise InputError(f"formulation must be one of {tuple(OFFERED)}, got {formulation!r}.")
-    if element not in OFFERED[formulation]:
-        raise InputError(
-            f"formulation {formulation!r} wants a mesh of {' or '.join(OFFERED[formulation])}, "
-            f"got {element}; use another mesh (elevated() gives P2, Q2L) or another formulation."
-        )
-
-
-def _require_split(law: Law, formulation: str) -> None:
-    if formulation != "displacement" and not law.is_split:
-        raise MaterialError(
-            f"formulation {formulation!r} needs a law with psi_dev and psi_vol, and {law.name} "
-            'gives psi as a whole; use formulation "displacement" or another law.'
-        )
-
-
-def _degree(mesh: Mesh, quadrature: int | tuple[int, str] | None) -> int | None:
-    """The rule that was asked for, checked before anything is compiled."""
-    from .kernels.degree import checked
-
-    if quadrature is None:
-        return None
-    try:
-        return checked(quadrature, mesh.table.cell.name)
-    except ValueError as problem:
-        raise InputError(str(problem)) from None
-
-
-def _vector(name: str, value: npt.ArrayLike) -> Floats:
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{name} must be three numbers, got {value!r}.")
-    return vector
-
-
-def _rows(name: str, value: npt.ArrayLike, count: int) -> Floats:
-    rows = np.asarray(value, dtype=float)
-    if rows.shape != (count, 3) or not np.isfinite(rows).all():
-        raise InputError(f"{name} must be finite with shape ({count}, 3), got {rows.shape}.")
-    return rows

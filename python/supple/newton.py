@@ -45,6 +45,7 @@ class Settings:
     atol: float | None = None
     max_iterations: int = 25
     progress: Progress | None = None
+    step_tol: float = 1e-8  # of the size
 
     def checked(self, rounding: float, mesh: Mesh) -> Any:
         """The runtime's settings; ``rounding`` is that of the internal forces, N.
@@ -61,7 +62,7 @@ class Settings:
         native = core().NewtonSettings()
         native.rtol, native.max_iterations = self.rtol, self.max_iterations
         native.load_steps = self.load_steps or 0
-        native.size = mesh.size
+        native.size, native.step_tol = mesh.size, self.step_tol
         native.atol = rounding if self.atol is None else self.atol
         return native
 

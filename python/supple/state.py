@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+#: Keys of `Equilibrium.timings`.
+PHASES = ("assembly", "factor", "solve", "total")
+
 
 @dataclass(frozen=True)
 class PointValues:
@@ -182,10 +185,19 @@ class Rest(Equilibrium):
     """The shape without loads, from a loaded one (Mazier 2022, chapter 3); ``u`` is X - x.
 
     Attributes:
-        method: "inverse" is exact; "reversed-gravity" is an approximation to compare with.
+        method: "inverse" is exact; "reversed-gravity" is an approximation to compare with; those
+            of "sellier" are as exact as they were asked to be.
+        density_of: the state, "rest" or "loaded", that the density counts in.
+        solves: forward solves that a method of "sellier" took, else 0; ``iterations``,
+            ``history`` and ``timings`` are over all of them.
+        misses: after each of its steps the largest distance of a node from where it should be, as
+            a share of the size.
     """
 
     method: str = "inverse"
+    density_of: str = "rest"
+    solves: int = 0
+    misses: tuple[float, ...] = ()
 
     @property
     def loaded(self) -> Mesh:
@@ -211,7 +223,7 @@ def outcome(
         "pressure": _pressure(result.u[fixed.size :] * built.scalar_unit, d),
         "iterations": sum(1 for i in result.history if i.iteration > 0),
         "history": [as_dict(i) for i in result.history],
-        "timings": {n: getattr(t, n) for n in ("assembly", "factor", "solve", "total")},
+        "timings": {n: getattr(t, n) for n in PHASES},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
         "warnings": _warnings(built.system.volume_ratio(result.u)),

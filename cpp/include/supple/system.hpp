@@ -18,7 +18,7 @@ class System {
  public:
   /// @param points (3n) coordinates of the mesh, m, node-major.
   /// @param home (scalars) the node whose neighbours each scalar unknown shares.
-  explicit System(std::shared_ptr<const Vector> points, std::vector<Index> home = {})
+  explicit System(std::shared_ptr<Vector> points, std::vector<Index> home = {})
       : points_(std::move(points)), home_(std::move(home)) {}
 
   /// Add a term; the pattern is made anew at the next use.
@@ -29,7 +29,11 @@ class System {
 
   Index scalars() const { return static_cast<Index>(home_.size()); }
   Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
-  const std::shared_ptr<const Vector>& points() const { return points_; }
+  std::shared_ptr<const Vector> points() const { return points_; }
+  /// Move the mesh under all terms of a direct system; pattern and symbolic factors stay. What a
+  /// term keeps of the old points goes when its fields are set anew, as they must be.
+  /// @throws ShapeError on a wrong size.
+  void move_points(const ConstVector& points);
   /// All terms have a potential, so energy() is that of residual().
   bool has_energy() const;
   /// By the origin of the terms: Unsymmetric where one is, QuasiDefinite with scalars, else
@@ -64,7 +68,7 @@ class System {
   Timings timings;
 
  private:
-  std::shared_ptr<const Vector> points_;
+  std::shared_ptr<Vector> points_;
   std::vector<Index> home_;
   std::vector<std::shared_ptr<Term>> terms_;
   Mask free_;
