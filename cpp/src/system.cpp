@@ -153,10 +153,7 @@ FactorStatus System::factorise(double shift) {
 }
 
 FactorStatus System::prepare_inverse() {
-  if (!inverse_) {
-    const Kind kind = scalars() > 0 ? Kind::QuasiDefinite : Kind::Cholesky;
-    inverse_ = std::make_unique<InverseSolver>(pattern(), reduction(), *points_, kind);
-  }
+  if (!inverse_) inverse_ = std::make_unique<InverseSolver>(pattern(), reduction(), *points_);
   const FactorStatus status = inverse_->prepare(values_, at_);
   count_work();
   return status;
