@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import failures, newton, parameters, supports, terms
-from .errors import InputError, MaterialError
+from .core import core
+from .errors import InputError, MaterialError, MeshError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
@@ -300,8 +302,6 @@ class Body:
         fields = outcome(result, built, self._description, self._fixed)
         rest = Rest(**fields, _solved=solved, _form="inverse", method=method)
         failures.require_usable(rest)
-        if method == "inverse":
-            failures.require_stable(rest, self._unstable_directions(rest))
         return rest
 
     def on(self, mesh: Mesh) -> Body:
@@ -355,18 +355,27 @@ class Body:
             start = np.zeros_like(target)
         else:
             start[self._prescribed.size :] /= built.scalar_unit
-        return newton.solve(built.system, start, target, native, settings), built
+        judge = partial(self._judge, built.scalar_unit) if inverse else None
+        return newton.solve(built.system, start, target, native, settings, judge), built
 
-    def _unstable_directions(self, rest: Rest) -> int:
-        """In which the loaded body on its rest shape buckles; 0 where loads without energy hide it."""
-        body = self.on(rest.mesh)
+    def _judge(self, scalar_unit: float, found: Floats, load_factor: float) -> Any:
+        """Whether this body, loaded, would rest on the rest shape of the unknowns ``found``.
+
+        One that any push leaves cannot have been seen in the given shape. Loads without an energy,
+        such as a pressure that follows, hide it.
+        """
+        outcome, n = core().Outcome, self._prescribed.size
+        try:
+            body = self.on(self.mesh.moved(self.mesh.points + found[:n].reshape(-1, 3)))
+        except MeshError:
+            return outcome.inverted
         built = body._system()
         if not built.system.has_energy():
-            return 0
-        u = unknowns(body, -rest.u, rest.pressure)
-        u[rest.u.size :] /= built.scalar_unit
-        built.system.set_free(np.append(~self._fixed.ravel(), np.ones(u.size - rest.u.size, bool)))
-        return int(built.system.unstable_directions(u))
+            return outcome.converged
+        pressure = found[n:] * (scalar_unit / built.scalar_unit)
+        built.system.set_free(np.append(~self._fixed.ravel(), np.ones(len(pressure), bool)))
+        directions = built.system.unstable_directions(np.append(-found[:n], pressure))
+        return outcome.unstable if directions else outcome.converged
 
     def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
         key = (inverse, density_of if inverse else "rest")

@@ -50,8 +50,19 @@ class Settings:
         return native
 
 
-def solve(system: Any, start: Floats, prescribed: Floats, native: Any, settings: Settings) -> Any:
-    """Run from ``start`` (dofs); the result's unknowns are ``result.u``, displacements first."""
+def solve(
+    system: Any,
+    start: Floats,
+    prescribed: Floats,
+    native: Any,
+    settings: Settings,
+    judge: Callable[[Floats, float], Any] | None = None,
+) -> Any:
+    """Run from ``start`` (dofs); the result's unknowns are ``result.u``, displacements first.
+
+    Args:
+        judge: says of the unknowns under a load factor what is wrong with them, as an Outcome.
+    """
     if not np.isfinite(system.residual(start, 1.0)).all():
         raise InputError(
             "the forces are not finite at the start: a parameter is outside of what its law can "
@@ -59,7 +70,7 @@ def solve(system: Any, start: Floats, prescribed: Floats, native: Any, settings:
         )
     report = settings.progress
     hook = None if report is None else lambda i: report(as_dict(i))
-    return system.solve(start, np.nan_to_num(prescribed), native, hook)
+    return system.solve(start, np.nan_to_num(prescribed), native, hook, judge)
 
 
 def as_dict(iteration: Any) -> dict[str, float]:
