@@ -21,9 +21,20 @@ supple::Progress python_progress(const py::object& callback) {
   };
 }
 
+/// Asks Python about an equilibrium; it answers with an Outcome.
+supple::Judge python_judge(const py::object& callback) {
+  if (callback.is_none()) return {};
+  return [&callback](const Vector& u, double load_factor) {
+    const py::gil_scoped_acquire gil;
+    return callback(u, load_factor).cast<supple::Outcome>();
+  };
+}
+
 supple::NewtonResult solve(supple::System& system, const Vector& start, const Vector& prescribed,
-                           const supple::NewtonSettings& settings, const py::object& progress) {
+                           supple::NewtonSettings settings, const py::object& progress,
+                           const py::object& judge) {
   const supple::Progress report = python_progress(progress);
+  settings.judge = python_judge(judge);
   const py::gil_scoped_release release;
   return supple::solve(system, start, prescribed, settings, report);
 }

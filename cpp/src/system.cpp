@@ -29,6 +29,7 @@ void System::forget_factors() {
 }
 
 void System::use_gmres(bool gmres) {
+  if (inverse_) inverse_->forget();
   if (gmres == gmres_) return;
   gmres_ = gmres;
   reduction_.reset();

@@ -350,6 +350,7 @@ class Body:
         inverse: bool = False,
         density_of: str = "rest",
         gmres: bool = False,
+        judge: newton.Judge | None = None,
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
         native.warm = start is not None
@@ -367,17 +368,15 @@ class Body:
             start = np.zeros_like(target)
         else:
             start[self._prescribed.size :] /= built.scalar_unit
-        return newton.solve(built.system, start, target, native, settings), built
+        return newton.solve(built.system, start, target, native, settings, judge), built
 
-    def _unstable_directions(self, u: Floats, pressure: Floats | None) -> int:
-        """In which the loaded body buckles at ``u``; 0 where loads without energy hide it."""
-        built = self._system()
-        if not built.system.has_energy():
+    def _unstable_directions(self, u: Floats) -> int:
+        """In which the body buckles at unknowns ``u``; 0 where loads without energy hide it."""
+        system = self._system().system
+        if not system.has_energy():
             return 0
-        at = unknowns(self, u, pressure)
-        at[u.size :] /= built.scalar_unit
-        built.system.set_free(np.append(~self._fixed.ravel(), np.ones(at.size - u.size, bool)))
-        return int(built.system.unstable_directions(at))
+        system.set_free(np.append(~self._fixed.ravel(), np.ones(system.scalars, bool)))
+        return int(system.unstable_directions(u))
 
     def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
         key = (inverse, density_of if inverse else "rest")

@@ -13,6 +13,7 @@ from .mesh_jacobian import smallest_jacobian
 from .newton import as_dict
 
 if TYPE_CHECKING:
+    from .mesh import Mesh
     from .state import Rest
     from .terms import Built, Description
 
@@ -43,8 +44,11 @@ def require_converged(
     if name == "converged":
         return
     cause = (_CAUSES_INVERSE if inverse else {}).get(name, _CAUSES[name])
-    cells = worst_cells(result, built, description)
     u = result.u[: description.mesh.points.size].reshape(-1, 3)
+    points = description.mesh.points + u
+    pressed = inverse and name == "inverted"
+    cells = pressed_cells(description.mesh, points) if pressed else None
+    cells = cells or worst_cells(result, built, description)
     raise ConvergenceError(
         f"no {'rest shape' if inverse else 'equilibrium'}: {cause}; "
         f"{100 * result.load_factor:.4g} % of the load was reached, "
@@ -53,7 +57,7 @@ def require_converged(
         cells=cells,
         load_factor=result.load_factor,
         cause=cause,
-        points=description.mesh.points + u,
+        points=points,
     )
 
 
@@ -99,25 +103,11 @@ def inverted(rest: Rest) -> list[int]:
     return [int(c) for c in worst if smallest[c] <= 0]
 
 
-def require_stable(rest: Rest, directions: int) -> None:
-    """Refuse a rest shape on which the loaded shape is an equilibrium that any push leaves.
-
-    A body cannot have been seen in it, and `Body.solve` refuses it too.
-
-    Raises:
-        ConvergenceError: with the shape that was found as its points.
-    """
-    if directions == 0:
-        return
-    cause = _CAUSES_INVERSE["unstable"]
-    raise ConvergenceError(
-        f"{cause} ({directions} directions of buckling); try a smaller load, a stiffer material, "
-        "more support or a finer mesh.",
-        history=rest.history,
-        load_factor=1.0,
-        cause=cause,
-        points=rest.points,
-    )
+def pressed_cells(mesh: Mesh, points: npt.NDArray[np.float64], count: int = 5) -> list[int]:
+    """Cells whose smallest Jacobian fell most on the way to ``points``, the worst first."""
+    before = smallest_jacobian(mesh.points, mesh.cells, mesh.table)
+    after = smallest_jacobian(points, mesh.cells, mesh.table)
+    return [int(c) for c in np.argsort(after / before, kind="stable")[:count]]
 
 
 def worst_cells(result: Any, built: Built, description: Description, count: int = 5) -> list[int]:

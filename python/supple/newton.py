@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[dict[str, float]], None]
+#: What is wrong with unknowns under a load factor, as an Outcome of the runtime.
+Judge = Callable[[Floats, float], Any]
 
 _FIELDS = ("load_factor", "iteration", "residual", "tolerance", "step", "length", "shift")
 
@@ -52,7 +54,14 @@ class Settings:
         return native
 
 
-def solve(system: Any, start: Floats, prescribed: Floats, native: Any, settings: Settings) -> Any:
+def solve(
+    system: Any,
+    start: Floats,
+    prescribed: Floats,
+    native: Any,
+    settings: Settings,
+    judge: Judge | None = None,
+) -> Any:
     """Run from ``start`` (dofs); the result's unknowns are ``result.u``, displacements first."""
     if not np.isfinite(system.residual(start, 1.0)).all():
         raise InputError(
@@ -61,7 +70,7 @@ def solve(system: Any, start: Floats, prescribed: Floats, native: Any, settings:
         )
     report = settings.progress
     hook = None if report is None else lambda i: report(as_dict(i))
-    return system.solve(start, np.nan_to_num(prescribed), native, hook)
+    return system.solve(start, np.nan_to_num(prescribed), native, hook, judge)
 
 
 def as_dict(iteration: Any) -> dict[str, float]:

@@ -5,14 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import numpy.typing as npt
+
 from . import directions, failures, fixed_point, overlap, terms
 from .choices import FIXED_POINTS, METHODS, SOLVERS, STATES
+from .core import core
 from .errors import InputError
+from .mesh_jacobian import smallest_jacobian
 from .newton import Settings
 from .state import Rest, outcome
 
 if TYPE_CHECKING:
     from .body import Body
+
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -68,14 +75,7 @@ def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
     else:
         rest = _solved(body, asked, start)
     failures.require_usable(rest)
-    if asked.method == "inverse":  # the others come from solves that refuse what is unstable
-        failures.require_stable(rest, _unstable_directions(rest))
     return rest
-
-
-def _unstable_directions(rest: Rest) -> int:
-    """In which the loaded body on its rest shape buckles; 0 where loads without energy hide it."""
-    return rest.body()._unstable_directions(-rest.u, rest.pressure)
 
 
 def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
@@ -83,7 +83,7 @@ def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
     begin = None if start is None else body._start(start)
     if asked.method == "inverse":
         gmres = asked.solver != "direct"
-        result, built = body._run(asked.settings, begin, True, asked.density_of, gmres)
+        result, built = body._run(asked.settings, begin, True, asked.density_of, gmres, Judge(body))
     else:
         result, built = body._reversed()._run(asked.settings, begin)
     failures.require_converged(result, built, body._description, inverse=True)
@@ -95,6 +95,31 @@ def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
         density_of=asked.density_of,
         _body=body._weighed_in(asked.density_of),
     )
+
+
+class Judge:
+    """Whether a body, loaded, would rest on the rest shapes that are found for it.
+
+    One that any push leaves cannot have been seen in the given shape. Loads without an energy, such
+    as a pressure that follows, hide it.
+
+    Args:
+        body: on the given shape.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self._body = body.on(body.mesh)
+
+    def __call__(self, found: Floats, _load_factor: float) -> Any:
+        """Converged, inverted or unstable, of the unknowns ``found`` of the inverse form."""
+        outcome, mesh = core().Outcome, self._body.mesh
+        points = mesh.points + found[: mesh.points.size].reshape(-1, 3)
+        if (smallest_jacobian(points, mesh.cells, mesh.table) <= 0).any():
+            return outcome.inverted
+        self._body._system().system.move_points(points.ravel())
+        loaded = found.copy()
+        loaded[: mesh.points.size] *= -1
+        return outcome.unstable if self._body._unstable_directions(loaded) else outcome.converged
 
 
 def _require_one(name: str, value: str, choices: tuple[str, ...]) -> None:

@@ -37,6 +37,9 @@ class InverseSolver {
   /// is singular. Both (free).
   bool solve(const Vector& rhs, double tolerance, Vector& x);
 
+  /// Let go of the factor that is kept, so that results do not depend on what was solved before.
+  void forget() { kept_ = nullptr; }
+
   SolverWork work;
 
  private:
