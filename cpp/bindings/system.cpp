@@ -6,6 +6,7 @@
 #include "supple/kernel_term.hpp"
 #include "supple/newton.hpp"
 #include "supple/sliding.hpp"
+#include "supple/stability.hpp"
 
 namespace {
 
@@ -20,9 +21,20 @@ supple::Progress python_progress(const py::object& callback) {
   };
 }
 
+/// Asks Python about an equilibrium; it answers with an Outcome.
+supple::Judge python_judge(const py::object& callback) {
+  if (callback.is_none()) return {};
+  return [&callback](const Vector& u, double load_factor) {
+    const py::gil_scoped_acquire gil;
+    return callback(u, load_factor).cast<supple::Outcome>();
+  };
+}
+
 supple::NewtonResult solve(supple::System& system, const Vector& start, const Vector& prescribed,
-                           const supple::NewtonSettings& settings, const py::object& progress) {
+                           supple::NewtonSettings settings, const py::object& progress,
+                           const py::object& judge) {
   const supple::Progress report = python_progress(progress);
+  settings.judge = python_judge(judge);
   const py::gil_scoped_release release;
   return supple::solve(system, start, prescribed, settings, report);
 }
@@ -169,6 +181,11 @@ void bind_system(py::module_& module) {
       .def("volume_ratio", &System::volume_ratio)
       .def("tangent", &tangent)
       .def("has_energy", &System::has_energy)
+      .def("unstable_directions",
+           [](System& system, const Vector& u) {
+             const py::gil_scoped_release release;
+             return supple::unstable_directions(system, u);
+           })
       .def("reset_timings", [](System& system) { system.timings = {}; })
       .def_readonly("timings", &System::timings)
       .def("solve", &solve);

@@ -16,6 +16,8 @@ constexpr double kFoldTol = 2e-4;  // of the load, on the largest
 constexpr double kCollapse = 1e-2; // volume ratio of a cell that is taken for collapsed
 constexpr int kMostFactors = 300;  // before a fold
 constexpr int kAfterFold = 8;      // at least, to see whether the path comes back
+constexpr int kReturns = 3;        // to where a fault begins: an eighth of the step
+constexpr double kNear = 0.05;     // of the load, to the whole of it where that has a fault
 
 /// Place in (0, 1) of the maximum of the cubic with values a, b and slopes p > 0 > q at 0 and 1.
 double cubic_maximum(double a, double b, double p, double q) {
@@ -42,8 +44,10 @@ Outcome ArcLength::run() {
   length_ = kFirst / here_.ds;
   Outcome outcome = Outcome::Converged;
   while (corrector_.factors() < budget()) {
+    if (fault_ != Outcome::Converged && fault_ == at_end_) break; // and so it is at the end
     const bool last = here_.ds > 0.0 && here_.s + length_ * here_.ds >= 1.0;
-    if (last && finish(outcome)) return outcome;
+    if (last && at_end_ == Outcome::Converged && finish(outcome)) return outcome;
+    if (last && at_end_ != Outcome::Converged && 1.0 - here_.s < kNear) return at_end_;
     if (last || !advance()) {
       length_ = 0.5 * (last ? std::min(length_, (1.0 - here_.s) / here_.ds) : length_);
       refused_ = true;
@@ -54,11 +58,14 @@ Outcome ArcLength::run() {
 }
 
 int ArcLength::budget() const {
-  if (factors_at_fold_ < 0) return kMostFactors;
-  return factors_at_fold_ + std::max(kAfterFold, factors_at_fold_ / 2);
+  int most = kMostFactors;
+  for (const int first : {factors_at_fold_, factors_at_fault_})
+    if (first >= 0) most = std::min(most, first + std::max(kAfterFold, first / 2));
+  return most;
 }
 
 Outcome ArcLength::end() const {
+  if (fault_ != Outcome::Converged) return fault_;
   if (factors_at_fold_ >= 0) return Outcome::LimitPoint;
   return p_.result.worst.value < kCollapse ? Outcome::Inverted : Outcome::Stalled;
 }
@@ -68,16 +75,18 @@ bool ArcLength::finish(Outcome& outcome) {
   Vector u = predict((1.0 - here_.s) / here_.ds).u;
   if (!p_.admissible(u, 1.0)) return false;
   outcome = step_.iterate(u, 1.0, Manner::Full);
-  if (outcome == Outcome::Converged) {
-    p_.result.u = u;
-    p_.result.load_factor = 1.0;
-  }
-  return outcome == Outcome::Converged || outcome == Outcome::Unstable;
+  if (outcome == Outcome::Unstable) return true;
+  if (outcome != Outcome::Converged) return false;
+  at_end_ = p_.judge(u, 1.0); // what is wrong there begins somewhere before: the path goes on
+  if (at_end_ != Outcome::Converged) return false;
+  p_.result.u = u;
+  p_.result.load_factor = 1.0;
+  return true;
 }
 
 bool ArcLength::advance() {
   ArcPoint next = predict(length_);
-  if (!arrive(next)) return false;
+  if (!arrive(next) || !passes(next)) return false;
   if (here_.ds > 0.0 && next.ds < 0.0 && factors_at_fold_ < 0) locate_fold(here_, next, length_);
   before_ = std::move(here_);
   here_ = std::move(next);
@@ -108,7 +117,25 @@ void ArcLength::choose_length() {
   refused_ = false;
 }
 
+/// Judges a point; the fault is narrowed down by shorter steps before the path goes on beyond it.
+bool ArcLength::passes(const ArcPoint& next) {
+  const Outcome verdict = p_.judge(next.u, next.s);
+  if (verdict == Outcome::Converged) {
+    fault_ = verdict;
+    factors_at_fault_ = -1;
+    return true;
+  }
+  if (returns_ < kReturns) {
+    ++returns_;
+    return false;
+  }
+  fault_ = verdict;
+  if (factors_at_fault_ < 0) factors_at_fault_ = corrector_.factors();
+  return true;
+}
+
 void ArcLength::keep(const ArcPoint& point) {
+  if (fault_ != Outcome::Converged) return;
   if (point.s <= p_.result.load_factor || point.s > 1.0) return;
   p_.result.u = point.u;
   p_.result.load_factor = point.s;

@@ -18,7 +18,9 @@ namespace supple {
 
 class ArcLength {
  public:
-  ArcLength(Problem& problem, LoadStep& step) : p_(problem), step_(step), corrector_(problem) {}
+  /// @param verdict what is wrong with the equilibrium under the whole load, if one is known.
+  ArcLength(Problem& problem, LoadStep& step, Outcome verdict)
+      : p_(problem), step_(step), corrector_(problem), at_end_(verdict) {}
 
   /// Follow the path from the problem's last equilibrium; its result is the largest load found.
   Outcome run();
@@ -26,6 +28,7 @@ class ArcLength {
  private:
   bool advance();
   bool finish(Outcome& outcome);
+  bool passes(const ArcPoint& next);
   bool arrive(ArcPoint& next);
   void choose_length();
   void locate_fold(ArcPoint low, ArcPoint high, double length);
@@ -41,8 +44,11 @@ class ArcLength {
   double length_ = 0.0;    // of the next step
   double last_ = 0.0;      // of the last one, 0 at the start
   double travelled_ = 0.0; // along the path
-  int factors_at_fold_ = -1;
-  bool refused_ = false; // the last step was
+  int factors_at_fold_ = -1, factors_at_fault_ = -1;
+  Outcome at_end_; // what is wrong with the equilibrium under the whole load, if it was found
+  Outcome fault_ = Outcome::Converged; // of the points last found, by their judge
+  int returns_ = 0;                    // to where the fault begins
+  bool refused_ = false;               // the last step was
 };
 
 } // namespace supple

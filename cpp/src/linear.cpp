@@ -203,9 +203,9 @@ void Factor::apply_inverse(const ConstVector& rhs, MutableVector x) {
   require_size("rhs", rhs.size(), s.pattern.size, "give one entry for each unknown");
   require_size("x", x.size(), s.pattern.size, "give one entry for each unknown");
   if (s.empty()) return;
-  const BlasThreads threads(blas_threads(s.backend->flops()));
+  const BlasThreads threads(blas_threads(s.active->flops()));
   s.rhs = rhs; // x may be the same vector
-  s.backend->solve(s.rhs.data(), x.data());
+  s.active->solve(s.rhs.data(), x.data());
 }
 
 Inertia Factor::inertia() const {

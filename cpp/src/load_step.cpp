@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "supple/krylov.hpp"
+#include "supple/stability.hpp"
 
 namespace supple {
 
@@ -14,7 +15,6 @@ constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
 constexpr double kSettled = 1e-3; // accuracy of the step that shows that no more are needed
-constexpr double kDoubtful = 1e8; // growth of LDLᵀ above which the signs of its pivots mean little
 constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
 constexpr int kHopeless = 3;      // full steps in a row after which the residual must have halved
 
@@ -67,10 +67,10 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     p_.record({s, k, norm, tol, step, length, shift_});
     if (!std::isfinite(norm)) return Outcome::Inverted;
     if (norm <= tol && length == 1.0 && shift_ == 0.0 && settled(u, r, norm, step, s)) {
-      return stable(u, s);
+      return stable(u);
     }
     if (norm <= tol && shift_ > 0.0 && step <= p_.settings.step_tol * p_.settings.size) {
-      return stable(u, s);
+      return stable(u);
     }
     if (manner == Manner::Full && norm > tol && gain.lost(norm)) break;
   }
@@ -111,22 +111,13 @@ bool LoadStep::settled(Vector& u, Vector& r, double norm, double step, double s)
 }
 
 /// An equilibrium with an indefinite tangent is not where a body rests.
-Outcome LoadStep::stable(const Vector& u, double s) {
+Outcome LoadStep::stable(const Vector& u) {
   if (!p_.has_energy) return Outcome::Converged;
-  if (!p_.minimises) return stable_saddle();
-  if (shift_ == 0.0 && !indefinite_) return Outcome::Converged; // K was definite one step ago
-  p_.assemble_tangent(u, s);
-  if (p_.system.factorise().ok()) return Outcome::Converged;
-  p_.result.negative = p_.system.inertia().negative;
+  const bool known = p_.minimises && shift_ == 0.0 && !indefinite_; // definite one step ago
+  if (known) return Outcome::Converged;
+  p_.result.negative =
+      p_.minimises ? unstable_directions(p_.system, u) : unstable_directions_of_saddle(p_.system);
   return p_.result.negative > 0 ? Outcome::Unstable : Outcome::Converged;
-}
-
-/// Of a mixed form's tangent each scalar gives one negative eigenvalue, and a stable body no more.
-Outcome LoadStep::stable_saddle() {
-  const Inertia inertia = p_.system.inertia();
-  p_.result.negative = inertia.negative - p_.system.scalars();
-  const bool doubtful = inertia.growth > kDoubtful;
-  return p_.result.negative == 0 || doubtful ? Outcome::Converged : Outcome::Unstable;
 }
 
 Outcome LoadStep::fault() const {

@@ -20,8 +20,7 @@ class LoadStep {
   double line_search(const Vector& u, const Vector& d, const Vector& r, double norm, double s,
                      Manner manner, bool moves_supports);
   bool settled(Vector& u, Vector& r, double norm, double step, double s);
-  Outcome stable(const Vector& u, double s);
-  Outcome stable_saddle();
+  Outcome stable(const Vector& u);
   Outcome fault() const;
 
   Problem& p_;

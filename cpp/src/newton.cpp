@@ -31,7 +31,7 @@ class Path {
   Outcome adaptive_steps() {
     Outcome outcome = p_.settings.follow ? Outcome::Stalled : reach(1.0, Manner::Full);
     if (ends(outcome) && p_.minimises && !p_.settings.follow) outcome = reach(1.0, Manner::Guarded);
-    return ends(outcome) ? ArcLength(p_, step_).run() : outcome;
+    return ends(outcome) ? ArcLength(p_, step_, verdict_).run() : outcome;
   }
 
   static bool ends(Outcome outcome) { return outcome != Outcome::Converged; }
@@ -39,7 +39,8 @@ class Path {
   /// Equilibrium at load factor `s` from the last one; the result keeps the last one if it fails.
   Outcome reach(double s, Manner manner) {
     Vector u = p_.result.u;
-    const Outcome outcome = step_.iterate(u, s, manner);
+    Outcome outcome = step_.iterate(u, s, manner);
+    if (outcome == Outcome::Converged && s == 1.0) outcome = verdict_ = p_.judge(u, s);
     if (outcome == Outcome::Converged) {
       p_.result.u = u;
       p_.result.load_factor = s;
@@ -49,6 +50,7 @@ class Path {
 
   Problem& p_;
   LoadStep step_;
+  Outcome verdict_ = Outcome::Converged; // of the whole load, where it was in equilibrium
 };
 
 } // namespace

@@ -32,6 +32,10 @@ class Problem {
   bool admissible(const Vector& u, double s);
   void assemble_tangent(const Vector& u, double s) { system.assemble_tangent(u, loads(s)); }
   void record(const Iteration& iteration);
+  /// Converged where nobody judges.
+  Outcome judge(const Vector& u, double s) const {
+    return settings.judge ? settings.judge(u, s) : Outcome::Converged;
+  }
 
   System& system;
   const NewtonSettings& settings;

@@ -29,6 +29,7 @@ void System::forget_factors() {
 }
 
 void System::use_gmres(bool gmres) {
+  if (inverse_) inverse_->forget();
   if (gmres == gmres_) return;
   gmres_ = gmres;
   reduction_.reset();
@@ -153,10 +154,7 @@ FactorStatus System::factorise(double shift) {
 }
 
 FactorStatus System::prepare_inverse() {
-  if (!inverse_) {
-    const Kind kind = scalars() > 0 ? Kind::QuasiDefinite : Kind::Cholesky;
-    inverse_ = std::make_unique<InverseSolver>(pattern(), reduction(), *points_, kind);
-  }
+  if (!inverse_) inverse_ = std::make_unique<InverseSolver>(pattern(), reduction(), *points_);
   const FactorStatus status = inverse_->prepare(values_, at_);
   count_work();
   return status;

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from .overlap import overlapping as overlapping
     from .prestress import Prestress as Prestress
     from .rest_check import RoundTrip as RoundTrip
-    from .round_trip import reversed_gravity_error as reversed_gravity_error
-    from .round_trip import round_trip_error as round_trip_error
+    from .rest_check import reversed_gravity_error as reversed_gravity_error
+    from .rest_check import round_trip as round_trip
+    from .rest_check import round_trip_error as round_trip_error
     from .state import Rest as Rest
     from .state import State as State
     from .surface import Surface as Surface
@@ -47,8 +48,9 @@ _HOME = {
     "material": "laws",
     "materials": "laws",
     "overlapping": "overlap",
-    "reversed_gravity_error": "round_trip",
-    "round_trip_error": "round_trip",
+    "reversed_gravity_error": "rest_check",
+    "round_trip": "rest_check",
+    "round_trip_error": "rest_check",
     "sensitivity": "sensitivity",
 }
 

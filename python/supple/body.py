@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import body_checks as checks
-from . import newton, overlap, parameters, rest_shape, supports, terms
+from . import failures, newton, parameters, rest_shape, supports, terms
 from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
@@ -169,6 +169,9 @@ class Body:
     ) -> Body:
         """Hold the nodes of ``where`` to a rigid surface, free to slide on it.
 
+        A rest shape and a solve on it come back to the shape given but for the depth to which the
+        nodes sink in, compliance × force.
+
         Args:
             compliance: m/N of the whole region, shared by tributary area; of each node if
                 ``per_node`` (Mazier 2022 uses 1e-8 m/N).
@@ -252,7 +255,7 @@ class Body:
             raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         result, built = self._run(settings, None if start is None else self._start(start))
-        newton.require_converged(result, built, self._description)
+        failures.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
         return State(
             **outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct"
@@ -287,10 +290,10 @@ class Body:
             start: a rest shape of this mesh to start from, as after a small change of the body;
                 from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
-            check_overlap: refuse a rest shape of which two parts are in one place
-                (`supple.overlapping`); one with cells inside out is always refused.
             solver: of the inverse's unsymmetric tangents: "gmres" on few symmetric factorisations,
                 LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres".
+            check_overlap: refuse a rest shape of which two parts are in one place
+                (`supple.overlap.overlapping`); one with cells inside out is always refused.
             **fixed_point_options: of the methods of "sellier": `fixed_point.FixedPoint`.
 
         Raises:
@@ -300,12 +303,9 @@ class Body:
         """
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         asked = rest_shape.Request(
-            method, density_of, directions_of, solver, settings, fixed_point_options
+            method, density_of, directions_of, solver, check_overlap, settings, fixed_point_options
         )
-        rest = rest_shape.find(self, asked, start)
-        if check_overlap:
-            overlap.require_apart(rest.mesh)
-        return rest
+        return rest_shape.find(self, asked, start)
 
     def on(self, mesh: Mesh) -> Body:
         """The same laws, supports and loads on a moved copy of the mesh, such as ``rest.mesh``."""
@@ -328,7 +328,7 @@ class Body:
     # Inside
 
     def _weighed_in(self, state: str) -> Body:
-        """A copy whose density counts at rest, or whose nodes have the masses of the loaded shape."""
+        """A copy, its density that at rest or its nodes with the masses of the loaded shape."""
         body = self.on(self.mesh)
         if state == "loaded" and body._description.masses is None:
             body._description.masses = terms.nodal_masses(self._description)
@@ -350,6 +350,7 @@ class Body:
         inverse: bool = False,
         density_of: str = "rest",
         gmres: bool = False,
+        judge: newton.Judge | None = None,
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
         native.warm = start is not None
@@ -367,7 +368,15 @@ class Body:
             start = np.zeros_like(target)
         else:
             start[self._prescribed.size :] /= built.scalar_unit
-        return newton.solve(built.system, start, target, native, settings), built
+        return newton.solve(built.system, start, target, native, settings, judge), built
+
+    def _unstable_directions(self, u: Floats) -> int:
+        """In which the body buckles at unknowns ``u``; 0 where loads without energy hide it."""
+        system = self._system().system
+        if not system.has_energy():
+            return 0
+        system.set_free(np.append(~self._fixed.ravel(), np.ones(system.scalars, bool)))
+        return int(system.unstable_directions(u))
 
     def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
         key = (inverse, density_of if inverse else "rest")

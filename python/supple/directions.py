@@ -10,8 +10,7 @@ an image of the loaded shape gives f, f0 ∥ F̄⁻¹ f and F̄ depends on f0 th
 
 Several directions of one law go back each on its own. A pair that is orthonormal under load is not
 so at rest; laws that want orthogonal axes make them (`supple.energy.axes`): the fibre as it is, the
-sheet in the plane of both lines. Anderson (1965), J. ACM 12; Walker and Ni (2011), SIAM J. Numer.
-Anal. 49.
+sheet in the plane of both lines.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import terms
+from .acceleration import Anderson
 from .errors import ConvergenceError
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _settled(
     f, rest = given if start is None else _pulled_back(start, given, trial), start
     found: list[Rest] = []
     turns: list[float] = []
-    mix = Mixture(_DEPTH)
+    acceleration = Anderson(_DEPTH)
     for _ in range(_PATIENCE):
         _hand(trial, f)
         rest = solve(trial, rest)
@@ -94,7 +94,7 @@ def _settled(
         falls = len(turns) < 2 or turns[-1] < 0.5 * turns[-2]
         if turns[-1] <= SETTLED or (turns[-1] <= ROUNDING and not falls):
             return _summed(rest, found)
-        f = _unit(mix.next(f, back))
+        f = _unit(acceleration.step(f.ravel(), (back - f).ravel()).reshape(-1, 3))
     raise ConvergenceError(
         f"no rest shape: {_CAUSE}; after {len(turns)} rest shapes they still turn by "
         f"{turns[-1]:.3g} rad; try a smaller load, or give the directions at rest "
@@ -103,29 +103,6 @@ def _settled(
         load_factor=1.0,
         cause=_CAUSE,
     )
-
-
-class Mixture:
-    """Anderson's acceleration of x ← g(x), type II, of the last few differences.
-
-    Args:
-        depth: how many differences it remembers.
-    """
-
-    def __init__(self, depth: int) -> None:
-        self._depth = depth
-        self._images: list[Floats] = []
-        self._misses: list[Floats] = []
-
-    def next(self, x: Floats, image: Floats) -> Floats:
-        """The next argument after ``x`` (any shape) with its image g(x)."""
-        self._images = [*self._images, image][-self._depth - 1 :]
-        self._misses = [*self._misses, (image - x).ravel()][-self._depth - 1 :]
-        if len(self._misses) == 1:
-            return image
-        change = np.diff(self._misses, axis=0)
-        weights = np.linalg.lstsq(change.T, self._misses[-1], rcond=1e-10)[0]
-        return np.asarray(image - np.tensordot(weights, np.diff(self._images, axis=0), 1))
 
 
 def _places(d: terms.Description) -> list[tuple[terms.Region, str]]:

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, terms
+from . import failures, newton, terms
 from .acceleration import Acceleration, Aitken, Anderson, Relaxation
+from .choices import FIXED_POINTS
 from .errors import ConvergenceError, InputError, MeshError
 from .state import PHASES, Rest, outcome
 
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from .body import Body
 
 Floats = npt.NDArray[np.float64]
-
-METHODS = ("sellier", "sellier-aitken", "sellier-anderson")
 
 #: Times that a step to where no forward solve succeeds is halved.
 _CUTS = 4
@@ -77,10 +76,10 @@ def options(given: dict[str, Any], method: str) -> FixedPoint:
     """
     known = FixedPoint.__dataclass_fields__
     for name in given:
-        if name not in known or method not in METHODS:
+        if name not in known or method not in FIXED_POINTS:
             raise InputError(
-                f"rest_shape with method {method!r} takes no {name!r}; {', '.join(METHODS)} take "
-                f"{', '.join(known)}."
+                f"rest_shape with method {method!r} takes no {name!r}; "
+                f"{', '.join(FIXED_POINTS)} take {', '.join(known)}."
             )
     return FixedPoint(**given)
 
@@ -138,7 +137,7 @@ class Forward:
             self.timings[name] += getattr(built.system.timings, name)
         rows = [newton.as_dict(i) | {"solve": float(self.solves)} for i in result.history]
         self.history += rows
-        newton.require_converged(result, built, body._description)
+        failures.require_converged(result, built, body._description)
         flat, n = result.u, self.target.size
         self._scalars = flat[n:] * built.scalar_unit
         points = body.mesh.points
@@ -156,7 +155,7 @@ def rest_shape(
     density_of: str,
     start: Rest | None,
 ) -> Rest:
-    """The rest shape by one of `METHODS`; `Body.rest_shape` says the rest.
+    """The rest shape by one of `FIXED_POINTS`; `Body.rest_shape` says the rest.
 
     Raises:
         ConvergenceError: the fixed point diverges or stalls, or a forward solve fails.

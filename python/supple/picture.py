@@ -65,13 +65,14 @@ def draw(
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     file = Path(path)
     if file.suffix not in (".png", ".svg") or not panels:
         raise InputError(f"a picture needs panels and a name in .png or .svg, got {file.name}.")
-    figure = Figure(figsize=(3.7 * len(panels) + 0.3, 3.8), dpi=100)
+    layout = ConstrainedLayoutEngine(w_pad=0.12)
+    figure = Figure(figsize=(3.7 * len(panels) + 0.3, 3.8), dpi=100, layout=layout)
     FigureCanvasAgg(figure)
-    figure.set_layout_engine("constrained", w_pad=0.12)
     box = _box(panels)
     for number, panel in enumerate(panels, start=1):
         axes: Any = figure.add_subplot(

@@ -5,17 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from . import directions, fixed_point, newton, terms
+import numpy as np
+import numpy.typing as npt
+
+from . import directions, failures, fixed_point, overlap, terms
+from .choices import FIXED_POINTS, METHODS, SOLVERS, STATES
+from .core import core
 from .errors import InputError
+from .mesh_jacobian import smallest_jacobian
 from .newton import Settings
 from .state import Rest, outcome
 
 if TYPE_CHECKING:
     from .body import Body
 
-METHODS = ("inverse", "reversed-gravity", *fixed_point.METHODS)
-SOLVERS = ("auto", "gmres", "direct")
-STATES = ("rest", "loaded")
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,7 @@ class Request:
     density_of: str
     directions_of: str
     solver: str
+    check_overlap: bool
     settings: Settings
     options: dict[str, Any] = field(default_factory=dict)  # of a fixed point
 
@@ -51,21 +56,25 @@ def find(body: Body, asked: Request, start: Rest | None) -> Rest:
     if start is not None and not isinstance(start, Rest):
         raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
     if asked.directions_of == "rest" or not directions.has_any(body):
-        return _find(body, asked, start)
-    mirrored = asked.method == "reversed-gravity"
-    return directions.rest_of_loaded(body, start, lambda b, s: _find(b, asked, s), mirrored)
+        rest = _find(body, asked, start)
+    else:
+        mirrored = asked.method == "reversed-gravity"
+        rest = directions.rest_of_loaded(body, start, lambda b, s: _find(b, asked, s), mirrored)
+    if asked.check_overlap:
+        overlap.require_apart(rest.mesh)
+    return rest
 
 
 def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
     """With the body's directions those at rest."""
-    if asked.method in fixed_point.METHODS:
+    if asked.method in FIXED_POINTS:
         chosen = fixed_point.options(asked.options, asked.method)
         rest = fixed_point.rest_shape(
             body, asked.method, asked.settings, chosen, asked.density_of, start
         )
     else:
         rest = _solved(body, asked, start)
-    newton.require_usable(rest)
+    failures.require_usable(rest)
     return rest
 
 
@@ -74,10 +83,10 @@ def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
     begin = None if start is None else body._start(start)
     if asked.method == "inverse":
         gmres = asked.solver != "direct"
-        result, built = body._run(asked.settings, begin, True, asked.density_of, gmres)
+        result, built = body._run(asked.settings, begin, True, asked.density_of, gmres, Judge(body))
     else:
         result, built = body._reversed()._run(asked.settings, begin)
-    newton.require_converged(result, built, body._description, inverse=True)
+    failures.require_converged(result, built, body._description, inverse=True)
     return Rest(
         **outcome(result, built, body._description, body._fixed),
         _solved=terms.snapshot(body._description),
@@ -86,6 +95,31 @@ def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
         density_of=asked.density_of,
         _body=body._weighed_in(asked.density_of),
     )
+
+
+class Judge:
+    """Whether a body, loaded, would rest on the rest shapes that are found for it.
+
+    One that any push leaves cannot have been seen in the given shape. Loads without an energy, such
+    as a pressure that follows, hide it.
+
+    Args:
+        body: on the given shape.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self._body = body.on(body.mesh)
+
+    def __call__(self, found: Floats, _load_factor: float) -> Any:
+        """Converged, inverted or unstable, of the unknowns ``found`` of the inverse form."""
+        outcome, mesh = core().Outcome, self._body.mesh
+        points = mesh.points + found[: mesh.points.size].reshape(-1, 3)
+        if (smallest_jacobian(points, mesh.cells, mesh.table) <= 0).any():
+            return outcome.inverted
+        self._body._system().system.move_points(points.ravel())
+        loaded = found.copy()
+        loaded[: mesh.points.size] *= -1
+        return outcome.unstable if self._body._unstable_directions(loaded) else outcome.converged
 
 
 def _require_one(name: str, value: str, choices: tuple[str, ...]) -> None:

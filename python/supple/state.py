@@ -19,7 +19,6 @@ from .projection import to_nodes
 if TYPE_CHECKING:
     from .body import Body
     from .mesh import Mesh
-    from .rest_check import RoundTrip
 
 Floats = npt.NDArray[np.float64]
 
@@ -243,19 +242,6 @@ class Rest(Equilibrium):
         """
         return self._body.on(self.mesh)
 
-    def round_trip(self, **settings: Any) -> RoundTrip:
-        """Load the rest shape again, and say how far it misses the given shape, and why.
-
-        Args:
-            **settings: of `Body.solve`.
-
-        Raises:
-            ConvergenceError: loading the rest shape from zero leads to no stable equilibrium.
-        """
-        from .rest_check import round_trip
-
-        return round_trip(self, **settings)
-
     def write_loaded(self, path: str | Path) -> Path:
         """Write the loaded shape as VTU with what it carries: where a later simulation starts.
 
@@ -282,7 +268,7 @@ def outcome(
         "timings": {n: getattr(t, n) for n in PHASES},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
-        "warnings": _warnings(built.system.volume_ratio(result.u)),
+        "warnings": _warnings(built.system.volume_ratio(result.u), result.fold),
     }
 
 
@@ -296,8 +282,16 @@ def _pressure(corners: Floats, d: terms.Description) -> Floats | None:
     return p
 
 
-def _warnings(smallest: Any) -> tuple[str, ...]:
-    """Laws whose energy stays finite at J = 0 are let through there, and told of here."""
-    if smallest.value > 0:
-        return ()
-    return (f"cells are inverted: the smallest J is {smallest.value:.3g}; use a law with ln J.",)
+def _warnings(smallest: Any, fold: float) -> tuple[str, ...]:
+    """Inverted cells, which laws with a finite energy at J = 0 let through, and folds passed."""
+    found = []
+    if smallest.value <= 0:
+        found.append(
+            f"cells are inverted: the smallest J is {smallest.value:.3g}; use a law with ln J."
+        )
+    if fold:
+        found.append(
+            f"the path passes a limit point at {100 * fold:.4g} % of the load, turns back and "
+            "comes to the whole load later: a body that is loaded slowly snaps there."
+        )
+    return tuple(found)

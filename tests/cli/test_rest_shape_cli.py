@@ -13,7 +13,6 @@ import supple
 from supple.cli import main
 from supple.cli._body_case import read_body
 from supple.cli._options_case import case_of
-from supple.cli.rest_shape import METHODS
 
 GRAVITY = np.array([0.0, 2.0, -9.81])
 LAW = {"young": 5e3, "poisson": 0.3}
@@ -289,9 +288,3 @@ def test_wrong_options_are_named_and_nothing_is_written(
     assert message in told
     assert len(told.splitlines()) == 1
     assert sorted(folder.iterdir()) == before
-
-
-def test_the_methods_are_those_of_the_body() -> None:
-    from supple.rest_shape import METHODS as known
-
-    assert known == METHODS

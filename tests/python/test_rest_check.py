@@ -24,12 +24,15 @@ def forces(body, rest):
     return np.abs(residual.ravel()[free]).max(), values.min()
 
 
-@pytest.mark.parametrize(("young", "given"), [(2e4, "reached"), (8e3, "another equilibrium")])
+@pytest.mark.parametrize(
+    ("young", "given"),
+    [(2e4, "reached"), (8e3, "another equilibrium")],
+)
 def test_what_the_given_shape_is_to_its_rest_shape(young, given):
-    """By residual and tangent at the given shape, a stable equilibrium of both bars."""
+    """By residual and tangent at the given shape."""
     body = cantilever(young)
     rest = body.rest_shape()
-    found = rest.round_trip()
+    found = supple.round_trip(rest)
     assert found.given == given
     residual, least = forces(body, rest)
     assert residual < 1e-12
@@ -41,20 +44,17 @@ def test_what_the_given_shape_is_to_its_rest_shape(young, given):
     assert found.seconds > 0
 
 
-def test_a_rest_shape_that_would_not_bear_its_load_is_refused_or_told_of():
-    """A bar so soft that it curls up at rest by more than half a turn: held level it flips over."""
+def test_a_rest_shape_on_which_the_given_one_would_buckle_is_refused():
+    """The softest bar curls up by more than a turn; its tangent at the given shape is indefinite."""
     body = cantilever(6e3)
-    try:
-        told = body.rest_shape().round_trip().given
-    except supple.ConvergenceError as refused:
-        told = refused.cause
-    assert "unstable" in told
+    with pytest.raises(supple.ConvergenceError, match="no rest shape"):
+        body.rest_shape()
 
 
 def test_an_approximate_rest_shape_has_the_given_one_for_no_equilibrium():
     body = cantilever(3e4)
     rest = body.rest_shape(method="reversed-gravity")
-    assert rest.round_trip().given == "no equilibrium"
+    assert supple.round_trip(rest).given == "no equilibrium"
     assert forces(body, rest)[0] > 1e-6
 
 
@@ -63,7 +63,7 @@ def test_a_rest_shape_that_leads_nowhere_raises():
     body = cantilever(2e4)
     rest = body.rest_shape()
     with pytest.raises(supple.ConvergenceError, match="no equilibrium: "):
-        rest.round_trip(load_steps=1, max_iterations=1)
+        supple.round_trip(rest, load_steps=1, max_iterations=1)
 
 
 @pytest.mark.parametrize("element", ["P1", "P2", "Q1"])
@@ -71,11 +71,12 @@ def test_weight_of_the_loaded_state_goes_round(element):
     """ρ of the loaded shape: its whole weight hangs on the supports, and the trip closes."""
     body = cantilever(4e4, element, (5, 2, 2))
     rest = body.rest_shape(density_of="loaded")
-    found = rest.round_trip()
+    found = supple.round_trip(rest)
     assert found.relative < 1e-9
     weight = 1000 * 9.81 * 0.06 * 0.012**2
     assert found.state.reactions[:, 2].sum() == pytest.approx(weight, rel=1e-9)
-    assert body.on(rest.mesh).solve().reactions[:, 2].sum() != pytest.approx(weight, rel=1e-4)
+    again = body.on(rest.mesh).solve()  # as if ρ counted at rest
+    assert abs(again.points - body.mesh.points).max() > 1e-5 * body.mesh.size
 
 
 @pytest.mark.parametrize("at", ["cells", "quadrature", "nodes"])

@@ -80,7 +80,7 @@ def test_loaded_fibres_lead_back_to_the_rest_shape_and_its_fibres(
 @every_case
 def test_the_body_at_rest_loads_back_to_shape_and_fibres(law, element, formulation, traction):
     """solve ∘ rest_shape = identity, and under load the fibres lie as given."""
-    body = fibrous(law, element, formulation, -0.5 * traction)
+    body = fibrous(law, element, formulation, 0.6 * traction)
     rest = body.rest_shape(directions_of="loaded")
     assert largest_turn(rest.directions(), given(body)) > np.radians(1)
     again = rest.body().solve()
@@ -108,7 +108,7 @@ def test_crossed_fibres_of_a_pulled_strip_stand_wider_apart_at_rest():
 
 def test_a_sheet_goes_back_with_its_plane():
     """Axes that the law makes at rest span the lines of matter that f and s span under load."""
-    body = fibrous("holzapfel_ogden", "P1", "displacement", -150.0)
+    body = fibrous("holzapfel_ogden", "P1", "displacement", 180.0)
     rest = body.rest_shape(directions_of="loaded")
     F, found, seen = rest.deformation_gradient(), rest.directions(), given(body)
     f, s = found["fibre"], found["sheet"]
@@ -215,14 +215,3 @@ def test_a_skin_with_directions_is_refused():
     body = supple.Body(supple.Mesh.box((1, 1, 1), (EDGE,) * 3), "neo_hookean")
     with pytest.raises(supple.MaterialError, match="guccione has a direction, fibre"):
         body.skin(lambda p: p[:, 0] > -1, "guccione", thickness=1e-3)
-
-
-@pytest.mark.parametrize("depth", [1, 3])
-def test_mixing_solves_a_linear_iteration_in_as_many_steps_as_it_remembers(depth):
-    """x ← A x + b with A of rank ``depth``: exact after depth + 2 images (Walker and Ni 2011)."""
-    rng = np.random.default_rng(3)
-    A = 0.3 * rng.standard_normal((6, depth)) @ rng.standard_normal((depth, 6))
-    b, x, mix = rng.standard_normal(6), np.zeros(6), directions.Mixture(depth)
-    for _ in range(depth + 2):
-        x = mix.next(x, A @ x + b)
-    np.testing.assert_allclose(x, np.linalg.solve(np.eye(6) - A, b), rtol=1e-9, atol=1e-9)

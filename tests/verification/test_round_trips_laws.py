@@ -13,8 +13,9 @@ from supple.laws import read_law
 pytestmark = pytest.mark.usefixtures("quick_compiler")
 EDGE = 0.1
 LAWS = {m.name: read_law(m.path) for m in supple.materials()}
-#: A skin's energy (fung_skin) makes no solid; test_membrane.py has the skins.
+#: A skin's energy (fung_skin) makes no solid; laws with directions or vertex order make no skin.
 SOLIDS = [name for name, law in LAWS.items() if law.solid]
+SKINS = [name for name, law in LAWS.items() if not {"isotropic", "objective"} & law.exceptions]
 #: Elements of a formulation; test_round_trips.py has the other elements, with one law.
 ON = {
     "displacement": ("P1", "P2", "Q1", "Q2"),
@@ -26,6 +27,7 @@ QUICK = (
     *("neo_hookean.P1.inverse", "corotational_polar.P1.inverse", "hooke.P1.inverse"),
     *("holzapfel_ogden.P1.inverse", "mooney_rivlin.P2.mixed_inverse"),
     "mooney_rivlin.Q1.mean_dilatation_inverse",
+    *("neo_hookean.T1.skin_inverse", "fung_skin.T1.skin_inverse"),
 )
 
 
@@ -35,8 +37,11 @@ def units():
         for formulation, prefix in FORMULATIONS.items():
             if formulation == "displacement" or LAWS[law].is_split:
                 for element in ON[formulation]:
-                    name = f"{law}.{element}.{prefix}inverse"
-                    yield pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+                    yield _param(f"{law}.{element}.{prefix}inverse")
+
+
+def _param(name):
+    return pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
 
 
 def varied(parameter, spread):
@@ -61,6 +66,18 @@ def block(unit):
     spread = np.linspace(0.9, 1.1, len(mesh.cells))
     body.set(**{p.name: varied(p, spread) for p in LAWS[law].parameters})
     return body.prescribe(np.arange(len(mesh.points)), np.where(mesh.points < 1e-9, 0.0, np.nan))
+
+
+def coated(unit):
+    """A soft block with a skin of its law on two free sides, about as stiff as the block."""
+    material = LAWS[unit.split(".")[0]]
+    body = block("neo_hookean.P1.inverse")
+    moduli = [p.default for p in material.parameters if p.unit == "Pa" and p.name != "bulk"]
+    given = {"poisson": 0.45} if "poisson" in [p.name for p in material.parameters] else {}
+    return body.skin(
+        lambda p: (p[:, 0] > EDGE - 1e-9) | (p[:, 1] > EDGE - 1e-9), material.name,
+        thickness=0.1 * EDGE * 3e3 / max(moduli), **given,
+    )  # fmt: skip
 
 
 def loaded(body, t):
@@ -100,10 +117,19 @@ def attempt(solve, load, start):
         return None
 
 
-@pytest.mark.parametrize("unit", units())
-def test_there_and_back(unit):
+@pytest.mark.parametrize("unit", [*units()])
+def test_solids_go_there_and_back(unit):
     """rest_shape ∘ solve and solve ∘ rest_shape = identity to 1e-9 of the size."""
-    body = block(unit)
+    there_and_back(block(unit))
+
+
+@pytest.mark.parametrize("unit", [_param(f"{law}.T1.skin_inverse") for law in SKINS])
+def test_skins_go_there_and_back(unit):
+    """The same of a skin on a soft body; taut along the pull, wrinkled across it."""
+    there_and_back(coated(unit))
+
+
+def there_and_back(body):
     mesh = body.mesh
     state = strained(lambda t, start: loaded(body, t).solve(start=start))
     rest = body.on(mesh.moved(state.points)).rest_shape()

@@ -17,6 +17,18 @@
 
 namespace supple {
 
+enum class Outcome {
+  Converged,
+  Unstable,   ///< an equilibrium with negative stiffness: a small push leaves it
+  Inverted,   ///< no step without an inverted cell
+  Singular,   ///< the tangent has no inverse
+  LimitPoint, ///< the load has a largest value on the path, below the whole, and did not come back
+  Stalled     ///< the residual does not fall any more
+};
+
+/// Whether an equilibrium (u, load factor) is of use; Converged if so, else what is wrong with it.
+using Judge = std::function<Outcome(const Vector&, double)>;
+
 struct NewtonSettings {
   double rtol = 1e-10;     ///< of max(‖external force‖, ‖reactions‖)
   double atol = 1e-14;     ///< N
@@ -27,6 +39,7 @@ struct NewtonSettings {
   bool refuse_inversion = true; ///< J ≤ 0 at a point is refused (not for barrier laws)
   bool warm = false;            ///< follow from u0 as it is instead of scaling the loads
   bool follow = false;          ///< the path at once, without trying the whole load first
+  Judge judge; ///< of the whole load's equilibrium and of those on the path; may be empty
 };
 
 /// One Newton iteration, or the start of a load step (iteration 0).
@@ -38,15 +51,6 @@ struct Iteration {
   double step = 0.0;      ///< ‖Δu‖∞, m
   double length = 1.0;    ///< share of the Newton step that was taken
   double shift = 0.0;     ///< added to an indefinite tangent, relative to its diagonal
-};
-
-enum class Outcome {
-  Converged,
-  Unstable,   ///< an equilibrium with negative stiffness: a small push leaves it
-  Inverted,   ///< no step without an inverted cell
-  Singular,   ///< the tangent has no inverse
-  LimitPoint, ///< the load has a largest value on the path, below the whole, and did not come back
-  Stalled     ///< the residual does not fall any more
 };
 
 struct NewtonResult {

@@ -29,7 +29,8 @@ class System {
   /// @throws ShapeError on a wrong size.
   void set_free(Mask free);
 
-  /// Solve with unsymmetric tangents, which are those of an inverse form, by GMRES instead of LU.
+  /// Solve with unsymmetric tangents, which are those of an inverse form, by GMRES instead of LU;
+  /// to be called before each run, which starts from no factor of an earlier one.
   void use_gmres(bool gmres);
 
   Index scalars() const { return static_cast<Index>(home_.size()); }

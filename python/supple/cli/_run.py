@@ -42,6 +42,12 @@ class Run:
         if self._folder is None:
             self._folder = OutputFolder(default)
 
+    @property
+    def target(self) -> Path:
+        """The output folder, for what must outlive a run that is stopped."""
+        assert self._folder is not None, "a command that writes files calls out_or first"
+        return self._folder.target
+
     def path(self, name: str) -> Path:
         """Where to write the output file `name`."""
         assert self._folder is not None, "a command that writes files calls out_or first"

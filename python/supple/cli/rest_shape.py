@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..choices import METHODS, SOLVERS, STATES
 from ..errors import ConvergenceError, InputError
 from ._run import Run, command
 
 if TYPE_CHECKING:
     from ..state import Rest
 
-METHODS = ("inverse", "reversed-gravity", "sellier", "sellier-aitken", "sellier-anderson")
 #: What may lie behind a rest shape that does not come back.
 _WHY = {
     "another equilibrium": "it has several stable shapes under this load, and this is another one",
     "unstable": "the given shape is an equilibrium that a push would leave",
     "no equilibrium": "the given shape is no equilibrium of it",
 }
-_ASKED = ("method", "density_of", "directions_of", "solver", "check_overlap")
 _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwise here
 
 
@@ -34,29 +33,28 @@ _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwi
     type=click.Choice(METHODS),
     default="inverse",
     show_default=True,
-    help="sellier's are fixed points of forward solves, to compare with; reversed-gravity is "
-    "approximate: its check fails.",
+    help="reversed-gravity is approximate, to compare with: its check fails.",
 )
 @click.option(
     "--density-of",
-    type=click.Choice(("rest", "loaded")),
+    type=click.Choice(STATES),
     default="rest",
     show_default=True,
     help="The state that the density counts in.",
 )
 @click.option(
     "--directions-of",
-    type=click.Choice(("rest", "loaded")),
+    type=click.Choice(STATES),
     default="rest",
     show_default=True,
-    help="The state in which the law's fibres lie as given.",
+    help="The state in which the law's directions, such as fibres, lie as given.",
 )
 @click.option(
     "--solver",
-    type=click.Choice(("auto", "gmres", "direct")),
+    type=click.Choice(SOLVERS),
     default="auto",
     show_default=True,
-    help="Of the inverse's linear systems: GMRES, or LU always.",
+    help="Of the unsymmetric tangents: auto is gmres; direct is LU.",
 )
 @click.option(
     "--check/--no-check",
@@ -93,9 +91,14 @@ _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwi
 def rest_shape(
     run: Run,
     loaded: Path,
+    method: str,
+    density_of: str,
+    directions_of: str,
+    solver: str,
     check: bool,
+    check_overlap: bool,
     allow_energy_files: bool,
-    **given: Any,
+    **mesh_options: Any,
 ) -> None:
     r"""Find the shape without loads of a body that is given as loaded.
 
@@ -118,10 +121,16 @@ def rest_shape(
 
     run.out_or(Path("out") / loaded.stem)
     run.progress("reading")
-    asked = {name: given.pop(name) for name in _ASKED}
-    case, allowed = _case(loaded, given, allow_energy_files)
+    case, allowed = _case(loaded, mesh_options, allow_energy_files)
     body, settings = read_body(case, allow_energy_files=allowed)
     run.progress("compiling")
+    asked: dict[str, Any] = {
+        "method": method,
+        "density_of": density_of,
+        "directions_of": directions_of,
+        "solver": solver,
+        "check_overlap": check_overlap,
+    }
     watch = _report.progress(run, "rest shape")
     try:
         rest = body.rest_shape(progress=watch, **asked, **settings)
@@ -129,8 +138,7 @@ def rest_shape(
         _failure.leave(run, error, body.mesh)
         raise
     run.replaces(_failure.FILES)
-    run.result |= asked | {"approximate": rest.method == "reversed-gravity"}
-    run.result["size_m"] = body.mesh.size
+    run.result |= asked | {"approximate": method == "reversed-gravity", "size_m": body.mesh.size}
     _report.equilibrium(run, rest, body.mesh, "rest.vtu")
     rest.write_loaded(run.path("loaded.vtu"))
     if check:
@@ -152,11 +160,13 @@ def _case(loaded: Path, mesh_options: dict[str, Any], allow_energy_files: bool) 
 
 
 def _check(run: Run, rest: Rest, settings: dict[str, Any]) -> None:
-    """Load the rest shape again; one that does not come back makes the result doubtful."""
+    """Load the rest shape again; what is farther off than `CLOSES` makes the result doubtful."""
+    from ..rest_check import round_trip
     from . import _report
 
+    watch = _report.progress(run, "loading again")
     try:
-        found = rest.round_trip(progress=_report.progress(run, "loading again"), **settings)
+        found = round_trip(rest, progress=watch, **settings)
     except ConvergenceError as error:
         run.result["check"] = {"passed": False, "cause": error.cause}
         run.doubt(f"loaded again, the rest shape does not come back: {error}")
