@@ -5,13 +5,15 @@
 #include <cmath>
 #include <Eigen/Dense>
 #include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
-#include "cholmod_library.hpp"
 #include "linear_backend.hpp"
 #include "supernodal_dense.hpp"
 #include "supernodal_tree.hpp"
 #include "supple/blas.hpp"
+#include "supple/error.hpp"
 
 namespace supple {
 namespace {
@@ -21,6 +23,7 @@ using Panel = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 using Part = Eigen::Map<Vector>;
 
 constexpr double kWorthThreads = 2e8; // flops of a factorisation above which a second thread pays
+constexpr int kBranches = 4;          // subtrees for each thread, so that all end at about one time
 
 std::size_t at(std::int64_t i) {
   return static_cast<std::size_t>(i);
@@ -32,7 +35,11 @@ class Array {
   double* sized(std::int64_t size) {
     if (size > size_) {
       values_.reset();
-      values_.reset(new double[at(size)]);
+      values_.reset(new (std::nothrow) double[at(size)]);
+      size_ = 0;
+      if (!values_)
+        throw NumericalError(
+            "the factorisation ran out of memory; use a coarser mesh or a lower order");
       size_ = size;
     }
     return values_.get();
@@ -50,13 +57,12 @@ class Supernodal final : public Backend {
 
   void analyse(const CscPattern& pattern) override {
     pattern_ = &pattern;
-    CholmodLibrary library(CHOLMOD_SUPERNODAL);
-    lu_ ? library.analyse(symmetric_lower(pattern)) : library.analyse(pattern);
-    flops_ = library.flops * (lu_ ? 2.0 : 1.0);
-    nonzeros_ = lu_ ? 2.0 * library.nonzeros - static_cast<double>(pattern.size) : library.nonzeros;
-    ordering_ = library.ordering;
-    const int threads = flops_ < kWorthThreads ? 1 : omp_get_max_threads();
-    tree_ = supernode_tree(*library.factor, pattern, threads > 1 ? 4 * threads : 1);
+    const int threads = omp_get_max_threads();
+    TreeReport report = make_tree(pattern, threads > 1 ? kBranches * threads : 1);
+    tree_ = std::move(report.tree);
+    flops_ = report.flops * (lu_ ? 2.0 : 1.0);
+    nonzeros_ = lu_ ? 2.0 * report.nonzeros - static_cast<double>(pattern.size) : report.nonzeros;
+    ordering_ = report.ordering;
     scale_.resize(pattern.size);
     x_.resize(pattern.size);
     pivot_.resize(lu_ ? at(pattern.size) : 0);
@@ -67,27 +73,13 @@ class Supernodal final : public Backend {
     measure_columns();
     factor_.sized(tree_.panels);
     updates_.sized(tree_.updates);
+    work_.resize(at(std::max(omp_get_max_threads(), 1)));
+    for (Array& work : work_)
+      work.sized(tree_.tallest_product);
     raised_ = 0;
-    const int threads = tree_.branch.size() > 1 ? omp_get_max_threads() : 1;
-    work_.resize(at(threads));
-    if (threads > 1) {
-      const BlasThreads one(1);
-      std::int64_t raised = 0;
-      const auto count = static_cast<Index>(tree_.branch.size());
-#pragma omp parallel for num_threads(threads) schedule(dynamic) reduction(+ : raised)
-      for (Index b = 0; b < count; ++b) {
-        const Range& range = tree_.branch[at(b)];
-        for (Index s = range.begin; s < range.end; ++s)
-          raised += front(s, work_[at(omp_get_thread_num())]);
-      }
-      raised_ += raised;
-    } else {
-      for (const Range& range : tree_.branch)
-        for (Index s = range.begin; s < range.end; ++s)
-          raised_ += front(s, work_[0]);
-    }
+    factorise_branches();
     for (const Index s : tree_.trunk)
-      raised_ += front(s, work_[0]);
+      raised_ += front(s, work_[0].get());
     return {};
   }
 
@@ -142,6 +134,20 @@ class Supernodal final : public Backend {
       scale_[j] = largest[tree_.order[at(j)]];
   }
 
+  void factorise_branches() {
+    const auto count = static_cast<Index>(tree_.branch.size());
+    const int threads = count > 1 && flops_ > kWorthThreads ? static_cast<int>(work_.size()) : 1;
+    const auto one_thread = threads > 1 ? std::make_unique<BlasThreads>(1) : nullptr;
+    std::int64_t raised = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic) reduction(+ : raised)
+    for (Index b = 0; b < count; ++b) {
+      const Range& range = tree_.branch[at(b)];
+      for (Index s = range.begin; s < range.end; ++s)
+        raised += front(s, work_[at(omp_get_thread_num())].get());
+    }
+    raised_ += raised;
+  }
+
   Block lower(const Supernode& node) const { return {factor_.get() + node.panel, node.height()}; }
   Block upper(const Supernode& node) const {
     return {factor_.get() + node.panel + static_cast<std::int64_t>(node.columns) * node.height(),
@@ -155,7 +161,7 @@ class Supernodal final : public Backend {
   Index row(const Supernode& node, Index i) const { return tree_.row[at(node.rows + i)]; }
 
   /// Assemble and eliminate one supernode; how many pivots had to be raised.
-  std::int64_t front(Index s, Array& work) {
+  std::int64_t front(Index s, double* work) {
     const Supernode& node = tree_.node[at(s)];
     const Supernode& next = tree_.node[at(s) + 1];
     const Index k = node.columns, m = node.below;
@@ -165,8 +171,7 @@ class Supernodal final : public Backend {
     for_children(s, [&](const Supernode& child) { add_to_panel(child, node); });
     dense::PivotGuard guard{scale_.data() + node.first};
     const Block l = lower(node), below = l.from(k, 0);
-    double* const scratch = work.sized(tree_.tallest_product);
-    Block product{scratch, m}; // (m, k) with L₂₁ productᵀ the update
+    Block product{work, m}; // (m, k) with L₂₁ productᵀ the update
     if (lu_) {
       product = upper(node);
       Index* const pivot = pivot_.data() + node.first;
@@ -178,7 +183,7 @@ class Supernodal final : public Backend {
       dense::divide_by_upper(below, m, l, k);
       dense::subtract_product(update(node), m, m, below, product, k, 0.0);
     } else {
-      dense::factor_ldlt(l, k, scratch, guard);
+      dense::factor_ldlt(l, k, work, guard);
       dense::divide_by_lower(below, m, l, k);
       for (Index j = 0; j < k; ++j) {
         const double reciprocal = 1.0 / l(j, j);
@@ -243,7 +248,7 @@ class Supernodal final : public Backend {
         std::swap(x[j], x[pivot_[at(node.first + j)]]);
     l.topRows(k).triangularView<Eigen::UnitLower>().solveInPlace(x);
     if (m == 0) return;
-    Part product(work_[0].sized(tree_.tallest_product), m);
+    Part product(work_[0].get(), m);
     product.noalias() = l.bottomRows(m) * x;
     for (Index i = 0; i < m; ++i)
       x_[row(node, i)] -= product[i];
@@ -252,7 +257,7 @@ class Supernodal final : public Backend {
   void backward(const Supernode& node) {
     const Panel l = panel(node);
     const Index k = node.columns, m = node.below;
-    Part x(x_.data() + node.first, k), below(work_[0].sized(tree_.tallest_product), m);
+    Part x(x_.data() + node.first, k), below(work_[0].get(), m);
     for (Index i = 0; i < m; ++i)
       below[i] = x_[row(node, i)];
     if (lu_) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr Index kLeaf = 16;  ///< columns below which loops beat a call of the BLAS
 constexpr Index kStrip = 32; ///< rows that stay in registers while a leaf is divided
-constexpr Index kWide = 128; ///< columns of a strip of a lower triangle
+constexpr Index kWhole = 48; ///< size below which a square is as quick as its lower triangle
 
 void multiply_add(const char* transposed, Block c, Index rows, Index columns, Block a, Block b,
                   Index inner, double beta) {
@@ -163,9 +163,14 @@ void subtract_product(Block c, Index rows, Index columns, Block a, Block b, Inde
 }
 
 void subtract_lower(Block c, Index size, Block a, Block b, Index inner, double beta) {
-  for (Index j = 0; j < size; j += kWide)
-    subtract_product(c.from(j, j), size - j, std::min(kWide, size - j), a.from(j, 0), b.from(j, 0),
-                     inner, beta);
+  if (size <= kWhole) {
+    subtract_product(c, size, size, a, b, inner, beta);
+    return;
+  }
+  const Index top = half(size), bottom = size - top;
+  subtract_lower(c, top, a, b, inner, beta);
+  subtract_product(c.from(top, 0), bottom, top, a.from(top, 0), b, inner, beta);
+  subtract_lower(c.from(top, top), bottom, a.from(top, 0), b.from(top, 0), inner, beta);
 }
 
 void divide_by_lower(Block b, Index rows, Block l, Index size) {

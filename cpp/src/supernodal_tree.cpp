@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "cholmod_library.hpp"
 #include "suitesparse.hpp"
 #include "supple/error.hpp"
 
@@ -209,21 +210,7 @@ struct Builder {
   }
 };
 
-} // namespace
-
-SupernodeTree supernode_tree(const cholmod_factor& factor, const CscPattern& pattern,
-                             int branches) {
-  SupernodeTree tree;
-  Builder builder{tree, pattern, !pattern.lower, {}, {}};
-  builder.read(factor);
-  builder.lay_panels();
-  builder.link();
-  builder.place_entries();
-  builder.cut(branches);
-  builder.lay_updates();
-  return tree;
-}
-
+/// The lower triangle of A + Aᵀ; the groups are kept.
 CscPattern symmetric_lower(const CscPattern& full) {
   CscPattern transposed;
   transposed.start.assign(at(full.size) + 1, 0);
@@ -251,6 +238,22 @@ CscPattern symmetric_lower(const CscPattern& full) {
     lower.start.push_back(lower.nonzeros());
   }
   return lower;
+}
+
+} // namespace
+
+TreeReport make_tree(const CscPattern& pattern, int branches) {
+  CholmodLibrary library(CHOLMOD_SUPERNODAL);
+  library.analyse(pattern.lower ? pattern : symmetric_lower(pattern));
+  TreeReport report{{}, library.flops, library.nonzeros, library.ordering};
+  Builder builder{report.tree, pattern, !pattern.lower, {}, {}};
+  builder.read(*library.factor);
+  builder.lay_panels();
+  builder.link();
+  builder.place_entries();
+  builder.cut(branches);
+  builder.lay_updates();
+  return report;
 }
 
 } // namespace supple

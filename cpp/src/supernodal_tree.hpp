@@ -5,8 +5,6 @@
 /// over: Duff and Reid (1983), ACM TOMS 9(3).
 #pragma once
 
-#include <cholmod.h>
-
 #include <cstdint>
 #include <vector>
 
@@ -54,11 +52,16 @@ struct SupernodeTree {
   Index size() const { return static_cast<Index>(node.size()) - 1; }
 };
 
-/// @param factor supernodal symbolic factor of the pattern.
-/// @param branches how many independent subtrees to look for; 1 for none.
-SupernodeTree supernode_tree(const cholmod_factor& factor, const CscPattern& pattern, int branches);
+/// A tree, and what its ordering costs.
+struct TreeReport {
+  SupernodeTree tree;
+  double flops = 0.0, nonzeros = 0.0; ///< of LLᵀ
+  const char* ordering = "none";
+};
 
-/// The lower triangle of A + Aᵀ; the groups are kept.
-CscPattern symmetric_lower(const CscPattern& full);
+/// Analyse a pattern; of a full one that of A + Aᵀ, with room for U.
+/// @param branches how many independent subtrees to look for; 1 for none.
+/// @throws NumericalError out of memory, or a front of more than 2³² entries.
+TreeReport make_tree(const CscPattern& pattern, int branches);
 
 } // namespace supple
