@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace supple {
 
@@ -44,11 +45,12 @@ Outcome ArcLength::run() {
   length_ = kFirst / here_.ds;
   Outcome outcome = Outcome::Converged;
   while (fault_ == Outcome::Converged && corrector_.factors() < budget()) {
-    const bool last = here_.ds > 0.0 && here_.s + length_ * here_.ds >= 1.0;
-    if (last && at_end_ == Outcome::Converged && finish(outcome)) return outcome;
+    const double whole = length_to_whole();
+    const bool last = whole <= length_;
+    if (last && at_end_ == Outcome::Converged && finish(whole, outcome)) return outcome;
     if (last && at_end_ != Outcome::Converged && 1.0 - here_.s < kNear) return at_end_;
     if (last || !advance()) {
-      length_ = 0.5 * (last ? std::min(length_, (1.0 - here_.s) / here_.ds) : length_);
+      length_ = 0.5 * std::min(length_, whole);
       refused_ = true;
     }
     if (length_ < kSmallest * std::max(travelled_, kFirst)) break;
@@ -67,9 +69,16 @@ Outcome ArcLength::end() const {
   return p_.result.worst.value < kCollapse ? Outcome::Inverted : Outcome::Stalled;
 }
 
-/// The whole load from where the tangent meets it.
-bool ArcLength::finish(Outcome& outcome) {
-  Vector u = predict((1.0 - here_.s) / here_.ds).u;
+/// Where the predicted path meets the whole load; infinite where it turns back before.
+double ArcLength::length_to_whole() const {
+  const double missing = 1.0 - here_.s, bend = predict(1.0).s - here_.s - here_.ds;
+  const double inside = here_.ds * here_.ds + 4.0 * bend * missing;
+  const double length = 2.0 * missing / (here_.ds + std::sqrt(inside)); // NaN: no such root
+  return length > 0.0 ? length : std::numeric_limits<double>::infinity();
+}
+
+bool ArcLength::finish(double length, Outcome& outcome) {
+  Vector u = predict(length).u;
   if (!p_.admissible(u, 1.0)) return false;
   outcome = step_.iterate(u, 1.0, Manner::Full);
   if (outcome == Outcome::Unstable) return true;
@@ -116,6 +125,7 @@ void ArcLength::choose_length() {
 
 /// Judges a point; where a fault begins is narrowed down by shorter steps, and the path ends there.
 bool ArcLength::passes(const ArcPoint& next) {
+  if (next.s <= p_.result.load_factor) return true; // on a way back, nothing to be kept
   const Outcome verdict = p_.judge(next.u, next.s);
   if (verdict != Outcome::Converged && returns_++ == kReturns) fault_ = verdict;
   return verdict == Outcome::Converged;

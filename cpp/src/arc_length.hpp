@@ -27,7 +27,8 @@ class ArcLength {
 
  private:
   bool advance();
-  bool finish(Outcome& outcome);
+  double length_to_whole() const;
+  bool finish(double length, Outcome& outcome);
   bool passes(const ArcPoint& next);
   bool arrive(ArcPoint& next);
   void choose_length();

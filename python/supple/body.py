@@ -366,12 +366,12 @@ class Body:
         """
         outcome, n = core().Outcome, self._prescribed.size
         try:
-            body = self.on(self.mesh.moved(self.mesh.points + found[:n].reshape(-1, 3)))
+            mesh = self.mesh.moved(self.mesh.points + found[:n].reshape(-1, 3))
         except MeshError:
             return outcome.inverted
-        built = body._system()
-        if not built.system.has_energy():
+        if self._description.pressures:
             return outcome.converged
+        built = self.on(mesh)._system()
         pressure = found[n:] * (scalar_unit / built.scalar_unit)
         built.system.set_free(np.append(~self._fixed.ravel(), np.ones(len(pressure), bool)))
         directions = built.system.unstable_directions(np.append(-found[:n], pressure))
