@@ -11,6 +11,7 @@ import click
 
 from ._run import Run, command
 from ._study_block import sagging_block
+from ._study_tetrahedron import single_tetrahedron
 
 
 def _hanging_dome(run: Run) -> None:
@@ -46,6 +47,7 @@ _STUDIES: dict[str, Callable[..., None]] = {
     "hanging-dome": _hanging_dome,
     "manufactured": _manufactured,
     "sagging-block": sagging_block,
+    "single-tetrahedron": single_tetrahedron,
 }
 
 
@@ -68,6 +70,9 @@ def study(run: Run, name: str, **options: Any) -> None:
                   the table each, in parallel; stopped, it goes on with --resume; exits with 3
                   if a rest shape misses the cube by more than 1e-9 m (--samples, --seed,
                   --jobs, --resume; --convergence)
+    single-tetrahedron
+                  153 loaded tetrahedra taken back by one inverse solve and by Sellier's
+                  method; exits with 3 if the inverse fails or misses by 1e-12 m (--seed)
     """
     given = {
         key: value for key, value in options.items() if value is not None and value is not False
