@@ -11,6 +11,7 @@ import click
 
 from ._run import Run, command
 from ._study_block import sagging_block
+from ._study_shear import inverse_shear
 from ._study_tetrahedron import single_tetrahedron
 
 
@@ -45,6 +46,7 @@ def _manufactured(run: Run) -> None:
 
 _STUDIES: dict[str, Callable[..., None]] = {
     "hanging-dome": _hanging_dome,
+    "inverse-shear": inverse_shear,
     "manufactured": _manufactured,
     "sagging-block": sagging_block,
     "single-tetrahedron": single_tetrahedron,
@@ -63,6 +65,8 @@ def study(run: Run, name: str, **options: Any) -> None:
 
     \b
     hanging-dome  rest and supine depth of a prone dome under gravity, beside DOLFINx'
+    inverse-shear simple and generalised shear undone for three laws and four elements: exact
+                  where the field is in the space, else rates; exits with 3 beyond 1e-12
     manufactured  a chosen field given back under its exact loads: rates of convergence of
                   displacement and strain for three laws and four elements; exits with 3 if
                   one is more than 0.1 off its theory

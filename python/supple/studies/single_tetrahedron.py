@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +31,7 @@ TETRAHEDRA, DENSITY, GRAVITY = 17, 1000.0, 9.81
 #: ρ g h / E. The free node carries a quarter of the weight.
 LOADS = (0.1, 0.3, 1.0)
 #: Parameters of a law that has Young's modulus, Pa, and Poisson's ratio at small strain.
-LAWS: dict[str, Callable[[float, float], dict[str, float]]] = {
+LAWS: dict[str, Callable[[float, float], dict[str, Any]]] = {
     "neo_hookean": lambda young, poisson: {"young": young, "poisson": poisson},
     "saint_venant_kirchhoff": lambda young, poisson: {"young": young, "poisson": poisson},
     "mooney_rivlin": lambda young, poisson: {
