@@ -23,7 +23,7 @@ from ..body import Body
 from ..errors import ConvergenceError
 from ..files import replacing
 from ..mesh import Mesh
-from ..round_trip import reversed_gravity_error, round_trip_error
+from ..rest_check import reversed_gravity_error, round_trip_error
 from ..state import Rest
 
 #: Newton iterations after which a method has failed.
