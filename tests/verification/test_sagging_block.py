@@ -37,7 +37,7 @@ def test_the_cube_comes_back_where_the_thesis_prints_its_error(block, parameters
     assert list(printed) == list(sagging_block.PRINTED.values())
     found = block.run(*parameters)
     assert found.outcome == SOLVED
-    assert found.mae <= found.largest < 1e-14
+    assert found.mae <= found.largest < 1e-11  # Newton's rtol is 1e-10 of the load
     assert found.reversed_gravity > 1e-5
 
 
