@@ -23,7 +23,7 @@ using Panel = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 using Part = Eigen::Map<Vector>;
 
 constexpr double kWorthThreads = 2e8; // flops of a factorisation above which a second thread pays
-constexpr int kBranches = 4;          // subtrees for each thread, so that all end at about one time
+constexpr int kBranches = 2; // shares for each thread: more of them leave more to the trunk
 
 std::size_t at(std::int64_t i) {
   return static_cast<std::size_t>(i);
