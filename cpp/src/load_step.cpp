@@ -14,7 +14,7 @@ namespace {
 constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
-constexpr double kSettled = 1e-3; // accuracy of the step that shows that no more are needed
+constexpr double kSettled = 1e-2; // accuracy of the step that shows that no more are needed
 constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
 constexpr int kHopeless = 3;      // full steps in a row after which the residual must have halved
 

@@ -41,7 +41,7 @@ GmresReport gmres(const Operator& matrix, const Operator& preconditioner, const 
 /// Source: Eisenstat, Walker (1996), SIAM J. Sci. Comput. 17(1), choice 2 with γ = 0.9, α = 2.
 class Forcing {
  public:
-  explicit Forcing(double loosest = 1e-2) : loosest_(loosest) {}
+  explicit Forcing(double loosest = 0.03) : loosest_(loosest) {}
   /// For the step from a residual of size `norm` that shall fall to `tolerance`.
   double next(double norm, double tolerance);
 
