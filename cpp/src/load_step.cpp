@@ -14,7 +14,7 @@ constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
 constexpr int kPatience = 4; // times more iterations where each is sure to lower the energy
-constexpr double kCreeping = 1.0 / 32.0; // of a step: a residual that falls no faster has no bottom
+constexpr double kCreeping = 1.0 / 32.0; // of a step, below which there are better ways on
 constexpr int kHopeless = 3; // full steps in a row after which the residual must have halved
 
 /// Full steps that no longer gain: a quick no, for there are better ways than to wait.
@@ -69,7 +69,7 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     if (norm <= tol && shift_ > 0.0 && step <= p_.settings.step_tol * p_.settings.size) {
       return stable(u);
     }
-    if (manner == Manner::Guarded && !descends && length < kCreeping) break;
+    if (!descends && length < kCreeping) break;
     if (manner == Manner::Full && norm > tol && gain.lost(norm)) break;
   }
   return fault();
