@@ -129,6 +129,7 @@ void bind_newton(py::module_& module) {
       .def_readwrite("size", &NewtonSettings::size)
       .def_readwrite("max_iterations", &NewtonSettings::max_iterations)
       .def_readwrite("load_steps", &NewtonSettings::load_steps)
+      .def_readwrite("kinks", &NewtonSettings::kinks)
       .def_readwrite("follow", &NewtonSettings::follow)
       .def_readwrite("refuse_inversion", &NewtonSettings::refuse_inversion)
       .def_readwrite("warm", &NewtonSettings::warm);

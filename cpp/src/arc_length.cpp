@@ -10,13 +10,15 @@ namespace {
 
 constexpr double kFirst = 0.2;     // of the load
 constexpr double kSmallest = 1e-3; // step, of the way that lies behind
-constexpr double kLoose = 1e-4;    // of the forces, on the way; the end is found to rtol
+constexpr double kLoose = 1e-3;    // of the forces, on the way; the end is found to rtol
+constexpr double kKinks = 3e-3;    // the same, where a law has kinks
 constexpr double kTight = 1e-6;    // of the forces, where the load is largest
 constexpr double kFar = 0.1;       // of a step: a correction after which the tangent is made anew
-constexpr double kFoldTol = 2e-4;  // of the load, on the largest
+constexpr double kLost = 0.5;      // of a step: a correction that is not trusted
+constexpr double kFoldTol = 4e-4;  // of the load, on the largest
 constexpr double kCollapse = 1e-2; // volume ratio of a cell that is taken for collapsed
 constexpr int kMostFactors = 300;  // before a fold
-constexpr int kAfterFold = 6;      // at least, to see whether the path comes back
+constexpr int kAfterFold = 4;      // at least, to see whether the path comes back
 constexpr int kReturns = 2;        // to where a fault begins: a quarter of the step
 constexpr double kNear = 0.05;     // of the load, to the whole of it where that has a fault
 
@@ -107,8 +109,9 @@ bool ArcLength::advance() {
 bool ArcLength::arrive(ArcPoint& next) {
   const Vector u = next.u;
   const double s = next.s;
-  if (!corrector_.correct(next, kLoose)) return false;
+  if (!corrector_.correct(next, p_.settings.kinks ? kKinks : kLoose)) return false;
   const double moved = corrector_.square(next.u - u, next.s - s);
+  if (moved > kLost * kLost * length_ * length_) return false; // perhaps another branch
   const bool far = moved > kFar * kFar * length_ * length_;
   return !(far || here_.ds * next.ds < 0.0) || corrector_.refresh(next);
 }

@@ -16,7 +16,8 @@ constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
 constexpr double kSettled = 1e-2; // accuracy of the step that shows that no more are needed
 constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
-constexpr int kHopeless = 3;      // full steps in a row after which the residual must have halved
+constexpr double kCreeping = 1.0 / 32.0; // of a step, below which there are better ways on
+constexpr int kHopeless = 3; // full steps in a row after which the residual must have halved
 
 /// Full steps that no longer gain: a quick no, for there are better ways than to wait.
 class Gain {
@@ -72,6 +73,7 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     if (norm <= tol && shift_ > 0.0 && step <= p_.settings.step_tol * p_.settings.size) {
       return stable(u);
     }
+    if (!descends && length < kCreeping) break;
     if (manner == Manner::Full && norm > tol && gain.lost(norm)) break;
   }
   return fault();

@@ -29,10 +29,11 @@ class Path {
     return Outcome::Converged;
   }
 
-  /// The whole load at once; along the energy where there is one to minimise; along the path.
+  /// The whole load at once; by descent where there is an energy, or kinks to get past; the path.
   Outcome adaptive_steps() {
     Outcome outcome = p_.settings.follow ? Outcome::Stalled : reach(1.0, Manner::Full);
-    if (ends(outcome) && p_.minimises && !p_.settings.follow) outcome = reach(1.0, Manner::Guarded);
+    const bool descends = (p_.minimises || p_.settings.kinks) && verdict_ == Outcome::Converged;
+    if (ends(outcome) && descends && !p_.settings.follow) outcome = reach(1.0, Manner::Guarded);
     if (ends(outcome)) outcome = ArcLength(p_, step_, verdict_).run();
     return outcome == Outcome::Stalled && p_.minimises ? halved_steps() : outcome;
   }

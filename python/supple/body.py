@@ -354,6 +354,7 @@ class Body:
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
         native.warm = start is not None
+        native.kinks = bool(self._description.skins or self._description.slides)
         supports.require_held(self.mesh, self._fixed, self._normals())
         built = self._system(inverse, density_of)
         laws = {r.law.name: r.law for r in self._description.regions if len(r.ids)}

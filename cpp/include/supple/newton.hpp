@@ -38,6 +38,7 @@ struct NewtonSettings {
   int load_steps = 0;      ///< equal steps without cut-back; 0: adaptive
   bool refuse_inversion = true; ///< J ≤ 0 at a point is refused (not for barrier laws)
   bool warm = false;            ///< follow from u0 as it is instead of scaling the loads
+  bool kinks = false;           ///< R is smooth in pieces only (skins that go slack, faces slid on)
   bool follow = false;          ///< the path at once, without trying the whole load first
   Judge judge; ///< of the whole load's equilibrium and of those on the path; may be empty
 };
