@@ -38,7 +38,29 @@ def _manufactured(run: Run) -> None:
             run.doubt(f"a rate is {series.miss:.2f} off its theory: {manufactured.line(series)}")
 
 
-_STUDIES = {"hanging-dome": _hanging_dome, "manufactured": _manufactured}
+def _rest_methods(run: Run) -> None:
+    from ..studies import rest_methods, rest_methods_figure
+
+    data = Path("..") / "shared" / "data"
+    todo, found = rest_methods.cases(data if data.is_dir() else None), []
+    for case in todo:
+        found.append(rest_methods.run(case, run.progress))
+    rest_methods.write(found, run.path("rest_methods.csv"))
+    for suffix in ("svg", "png"):
+        rest_methods_figure.draw(found, run.path(f"rest_methods.{suffix}"))
+    run.result["rows"] = [rest_methods.row(o, racer) for o in found for racer in o.racers]
+    for outcome in found:
+        for line in rest_methods.lines(outcome):
+            run.say(line)
+        for reason in rest_methods.beaten(outcome):
+            run.doubt(reason)
+
+
+_STUDIES = {
+    "hanging-dome": _hanging_dome,
+    "manufactured": _manufactured,
+    "rest-methods": _rest_methods,
+}
 
 
 @command
@@ -51,6 +73,9 @@ def study(run: Run, name: str) -> None:
     manufactured  a chosen field given back under its exact loads: rates of convergence of
                   displacement and strain for three laws and four elements; exits with 3 if
                   one is more than 0.1 off its theory
+    rest-methods  the largest gravity that the inverse solve and each fixed point of forward
+                  solves take off a block and a beam, and their times; with ../shared/data also
+                  the PDMS beam's mesh and a liver; exits with 3 if inverse is not ahead
     """
     run.out_or(Path("out") / name)
     _STUDIES[name](run)

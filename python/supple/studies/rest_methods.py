@@ -265,24 +265,47 @@ def beaten(outcome: Outcome) -> list[str]:
 
 def write(outcomes: list[Outcome], path: Path) -> Path:
     """The table as CSV; lengths are shares of the size, loads multiples of gravity."""
-    head = ["body", "method", "gravity_limit", "fails_at", "why", "load", "gravity", "solves",
-            "newton_iterations", "seconds", "over_inverse", "miss", "reversed_gravity_error"]  # fmt: skip
     with replacing(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(head)
-        for o in outcomes:
-            limits = {found.method: found for found in o.limits}
-            for r in o.racers:
-                end = limits.get(r.method)
-                until = (
-                    ("", "", "") if end is None else (_short(end.good), _short(end.bad), end.why)
-                )
-                ratio, shortcut = o.ratio(r.method, r.load), o.reversed_gravity[r.load]
-                table.writerow([o.case, r.method, *until, r.load, _short(r.factor), r.solves,
-                                r.iterations, _short(r.seconds), _short(ratio), _short(r.miss),
-                                _short(shortcut)])  # fmt: skip
+        lines = [row(o, racer) for o in outcomes for racer in o.racers]
+        table = csv.DictWriter(file, list(lines[0]), lineterminator="\n")
+        table.writeheader()
+        table.writerows(lines)
     return path
+
+
+def row(outcome: Outcome, racer: Racer) -> dict[str, Any]:
+    """One method on one body at one load."""
+    end = next((found for found in outcome.limits if found.method == racer.method), None)
+    return {
+        "body": outcome.case,
+        "method": racer.method,
+        "gravity_limit": "" if end is None else _short(end.good),
+        "fails_at": "" if end is None else _short(end.bad),
+        "why": "" if end is None else end.why,
+        "load": racer.load,
+        "gravity": _short(racer.factor),
+        "forward_solves": racer.solves,
+        "newton_iterations": racer.iterations,
+        "seconds": _short(racer.seconds),
+        "over_inverse": _short(outcome.ratio(racer.method, racer.load)),
+        "miss": _short(racer.miss),
+        "reversed_gravity_error": _short(outcome.reversed_gravity[racer.load]),
+    }
 
 
 def _short(value: float) -> str:
     return "" if np.isnan(value) else f"{value:.3g}"
+
+
+def lines(outcome: Outcome) -> list[str]:
+    """An outcome for people: limits, then times over the inverse's."""
+    limits = ", ".join(f"{found.method} {found.good:.3g} g" for found in outcome.limits)
+    told = [f"{outcome.case}: {limits}"]
+    for load, shortcut in outcome.reversed_gravity.items():
+        racers = [r for r in outcome.racers if r.load == load]
+        ratios = [f"{r.method} {outcome.ratio(r.method, load):.1f}" for r in racers[1:]]
+        told.append(
+            f"  {racers[0].factor:.3g} g in {1e3 * racers[0].seconds:.0f} ms; times over that: "
+            f"{', '.join(ratios)}; reversed gravity is off by {shortcut:.2g} of the size"
+        )
+    return told
