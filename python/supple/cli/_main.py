@@ -67,8 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (SuppleError, click.ClickException) as error:
         report(error, as_json="--json" in given)
         return exit_code(error)
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("supple: interrupted, nothing was written", err=True)
+    except (KeyboardInterrupt, click.Abort) as stop:
+        click.echo(f"supple: {str(stop) or 'interrupted, nothing was written'}", err=True)
         return INTERRUPTED
 
 
