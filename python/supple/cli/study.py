@@ -62,7 +62,7 @@ _STUDIES: dict[str, Callable[..., None]] = {
 @click.option("--jobs", type=int, help="Processes; 0 (default): one a processor.")
 @click.option("--resume", is_flag=True, help="Go on with the samples that --out holds.")
 @click.option("--data", type=click.Path(path_type=Path, file_okay=False, exists=True),
-              help="Folder with beam_pdms/Beam2k.msh and liver_sofa/liver.msh (rest-methods).")  # fmt: skip
+              help="Folder of beam_pdms/Beam2k.msh, liver_sofa/liver.msh.")  # fmt: skip
 @click.option("--convergence", is_flag=True, help="Finer and finer meshes in place of samples.")
 def study(run: Run, name: str, **options: Any) -> None:
     r"""Run a study; writes its table and figure to --out (default: out/ and its name).
@@ -77,6 +77,7 @@ def study(run: Run, name: str, **options: Any) -> None:
     rest-methods  the largest gravity that the inverse solve and the fixed points of forward
                   solves take off a block and a beam, with --data also off the PDMS beam's
                   mesh and a liver, and their times; exits with 3 if inverse is not ahead
+                  (--data)
     sagging-block a cube under its weight and back, for materials drawn at random: a line of
                   the table each, in parallel; stopped, it goes on with --resume; exits with 3
                   if a rest shape misses the cube by more than 1e-9 m (--samples, --seed,
