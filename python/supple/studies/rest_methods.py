@@ -32,6 +32,8 @@ BUDGET = 300
 GROWTH, BISECTIONS = 1.4, 3
 #: Loads of the race as shares of a limit: the least of all methods, and the least of Anderson's.
 EASY, HARD = 0.8, 0.95
+#: Multiple of gravity at which the way up ends.
+LARGEST = 100.0
 RACE_TOLERANCE, ACCEPTED, REPEATS = 1e-12, 1e-9, 3
 
 #: What `Body.rest_shape` is given, by name.
@@ -205,6 +207,8 @@ def limit(case: Case, method: str, progress: Callable[[str], None]) -> Limit:
     good, bad = 0.0, case.start
     while (why := reaches(bad)) is None:
         good, bad = bad, GROWTH * bad
+        if bad > LARGEST:
+            return Limit(method, good, np.inf, "none up to there")
     for _ in range(BISECTIONS):
         middle = float(np.sqrt(good * bad)) if good else 0.5 * bad
         found = reaches(middle)

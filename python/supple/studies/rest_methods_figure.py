@@ -61,7 +61,8 @@ def _bars(axes: Any, names: Sequence[str], values: dict[str, list[float]]) -> No
 
 def _legend(*panels: Any) -> tuple[list[Any], list[str]]:
     """Each method once."""
-    found = {}
+    found: dict[str, Any] = {}
     for axes in panels:
-        found |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+        handles, labels = axes.get_legend_handles_labels()
+        found |= dict(zip(labels, handles, strict=True))
     return list(found.values()), list(found)
