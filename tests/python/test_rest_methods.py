@@ -27,6 +27,7 @@ def bar(stretch):
 CASE = study.Case("bar", bar, start=1.3)
 
 
+@pytest.mark.slow
 def test_plain_fixed_point_ends_at_twice_the_length_and_the_inverse_does_not(monkeypatch):
     """Its miss is multiplied by 1 - s; near 2 the budget ends before it has converged."""
     monkeypatch.setattr(study, "LARGEST", 3.0)
