@@ -106,7 +106,7 @@ def test_a_factor_that_no_longer_serves_is_replaced():
 
 
 def test_a_load_without_a_rest_shape_fails_alike():
-    """A cube drawn from all sides beyond the fold of its pressure: same cause, same load reached."""
+    """A cube drawn from all sides beyond its fold: same cause, same load reached."""
     mesh = supple.Mesh.box((2, 2, 2), (1.0,) * 3, "P1")
     errors = []
     for solver in ("gmres", "direct"):
