@@ -307,7 +307,7 @@ def lines(outcome: Outcome) -> list[str]:
     told = [f"{outcome.case}: {limits}"]
     for load, shortcut in outcome.reversed_gravity.items():
         racers = [r for r in outcome.racers if r.load == load]
-        ratios = [f"{r.method} {outcome.ratio(r.method, load):.1f}" for r in racers[1:]]
+        ratios = [f"{r.method} {_short(outcome.ratio(r.method, load)) or '–'}" for r in racers[1:]]
         told.append(
             f"  {racers[0].factor:.3g} g in {1e3 * racers[0].seconds:.0f} ms; times over that: "
             f"{', '.join(ratios)}; reversed gravity is off by {shortcut:.2g} of the size"
