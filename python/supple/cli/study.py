@@ -11,6 +11,7 @@ import click
 
 from ._run import Run, command
 from ._study_block import sagging_block
+from ._study_methods import rest_methods
 from ._study_shear import inverse_shear
 from ._study_tetrahedron import single_tetrahedron
 
@@ -48,6 +49,7 @@ _STUDIES: dict[str, Callable[..., None]] = {
     "hanging-dome": _hanging_dome,
     "inverse-shear": inverse_shear,
     "manufactured": _manufactured,
+    "rest-methods": rest_methods,
     "sagging-block": sagging_block,
     "single-tetrahedron": single_tetrahedron,
 }
@@ -59,6 +61,8 @@ _STUDIES: dict[str, Callable[..., None]] = {
 @click.option("--seed", type=int, help="Of what is drawn at random (default 1).")
 @click.option("--jobs", type=int, help="Processes; 0 (default): one a processor.")
 @click.option("--resume", is_flag=True, help="Go on with the samples that --out holds.")
+@click.option("--data", type=click.Path(path_type=Path, file_okay=False, exists=True),
+              help="Folder of beam_pdms/Beam2k.msh, liver_sofa/liver.msh.")  # fmt: skip
 @click.option("--convergence", is_flag=True, help="Finer and finer meshes in place of samples.")
 def study(run: Run, name: str, **options: Any) -> None:
     r"""Run a study; writes its table and figure to --out (default: out/ and its name).
@@ -70,6 +74,10 @@ def study(run: Run, name: str, **options: Any) -> None:
     manufactured  a chosen field given back under its exact loads: rates of convergence of
                   displacement and strain for three laws and four elements; exits with 3 if
                   one is more than 0.1 off its theory
+    rest-methods  the largest gravity that the inverse solve and the fixed points of forward
+                  solves take off a block and a beam, with --data also off the PDMS beam's
+                  mesh and a liver, and their times; exits with 3 if inverse is not ahead
+                  (--data)
     sagging-block a cube under its weight and back, for materials drawn at random: a line of
                   the table each, in parallel; stopped, it goes on with --resume; exits with 3
                   if a rest shape misses the cube by more than 1e-9 m (--samples, --seed,
