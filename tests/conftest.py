@@ -65,6 +65,16 @@ def compiled_units(request: pytest.FixtureRequest) -> None:
     assert [half.wait() for half in halves] == [0, 0]
 
 
+@pytest.fixture
+def quick_compiler(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The slow ones without optimisation: the same C, in a quarter of the compiler's time."""
+    from supple.kernels import build
+
+    if request.node.get_closest_marker("slow"):
+        flags = tuple("-O0" if flag == "-O3" else flag for flag in build.FLAGS)
+        monkeypatch.setattr(build, "FLAGS", flags)
+
+
 @pytest.fixture(scope="session")
 def distorted() -> Callable:
     """distorted(element, cells=(1, 1, 1), curved=True, seed=0): a unit box, every node moved.

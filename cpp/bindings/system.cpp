@@ -6,6 +6,7 @@
 #include "supple/kernel_term.hpp"
 #include "supple/newton.hpp"
 #include "supple/sliding.hpp"
+#include "supple/stability.hpp"
 
 namespace {
 
@@ -20,9 +21,20 @@ supple::Progress python_progress(const py::object& callback) {
   };
 }
 
+/// Asks Python about an equilibrium; it answers with an Outcome.
+supple::Judge python_judge(const py::object& callback) {
+  if (callback.is_none()) return {};
+  return [&callback](const Vector& u, double load_factor) {
+    const py::gil_scoped_acquire gil;
+    return callback(u, load_factor).cast<supple::Outcome>();
+  };
+}
+
 supple::NewtonResult solve(supple::System& system, const Vector& start, const Vector& prescribed,
-                           const supple::NewtonSettings& settings, const py::object& progress) {
+                           supple::NewtonSettings settings, const py::object& progress,
+                           const py::object& judge) {
   const supple::Progress report = python_progress(progress);
+  settings.judge = python_judge(judge);
   const py::gil_scoped_release release;
   return supple::solve(system, start, prescribed, settings, report);
 }
@@ -117,7 +129,7 @@ void bind_newton(py::module_& module) {
       .def_readwrite("size", &NewtonSettings::size)
       .def_readwrite("max_iterations", &NewtonSettings::max_iterations)
       .def_readwrite("load_steps", &NewtonSettings::load_steps)
-      .def_readwrite("smallest_step", &NewtonSettings::smallest_step)
+      .def_readwrite("follow", &NewtonSettings::follow)
       .def_readwrite("refuse_inversion", &NewtonSettings::refuse_inversion)
       .def_readwrite("warm", &NewtonSettings::warm);
   py::class_<Iteration>(module, "Iteration")
@@ -132,6 +144,7 @@ void bind_newton(py::module_& module) {
       .def_readonly("outcome", &NewtonResult::outcome)
       .def_readonly("u", &NewtonResult::u)
       .def_readonly("load_factor", &NewtonResult::load_factor)
+      .def_readonly("fold", &NewtonResult::fold)
       .def_readonly("residual", &NewtonResult::residual)
       .def_readonly("history", &NewtonResult::history)
       .def_readonly("worst", &NewtonResult::worst)
@@ -149,7 +162,9 @@ void bind_system(py::module_& module) {
       .def_readonly("assembly", &supple::Timings::assembly)
       .def_readonly("factor", &supple::Timings::factor)
       .def_readonly("solve", &supple::Timings::solve)
-      .def_readonly("total", &supple::Timings::total);
+      .def_readonly("total", &supple::Timings::total)
+      .def_readonly("factorisations", &supple::Timings::factorisations)
+      .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
         return std::make_unique<System>(std::make_shared<Vector>(std::move(points)),
@@ -159,12 +174,18 @@ void bind_system(py::module_& module) {
       .def("add", &System::add)
       .def("move_points", &System::move_points)
       .def("set_free", &System::set_free)
+      .def("use_gmres", &System::use_gmres)
       .def("energy", &System::energy)
       .def("residual", &System::residual)
       .def("external", &System::external)
       .def("volume_ratio", &System::volume_ratio)
       .def("tangent", &tangent)
       .def("has_energy", &System::has_energy)
+      .def("unstable_directions",
+           [](System& system, const Vector& u) {
+             const py::gil_scoped_release release;
+             return supple::unstable_directions(system, u);
+           })
       .def("reset_timings", [](System& system) { system.timings = {}; })
       .def_readonly("timings", &System::timings)
       .def("solve", &solve);

@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -14,7 +15,9 @@ namespace supple {
 
 struct Factor::State {
   Kind kind;
-  std::unique_ptr<Backend> backend;
+  std::unique_ptr<Backend> backend, reserve; ///< the reserve is made where it is needed
+  Backend* active = nullptr;                 ///< the one that solves
+  bool reserve_analysed = false;
   CscPattern pattern;
   Vector values;                           ///< of the last factorise
   Vector rhs, residual, correction, trial; ///< work space of a solve
@@ -22,6 +25,10 @@ struct Factor::State {
   bool analysed = false, factorised = false;
 
   bool empty() const { return pattern.size == 0; }
+  FactorStatus factorise_with(Backend& chosen);
+  FactorStatus fall_back();
+  SolveReport refine(MutableVector x, const Refinement& refinement);
+  bool probe();
 };
 
 namespace {
@@ -76,11 +83,17 @@ bool good_enough(const SolveReport& report, const Refinement& refinement) {
   return report.backward <= rounding || report.residual <= refinement.tolerance;
 }
 
+/// What refinement of a usable factor reaches; the rest is the fault of pivots not chosen.
+bool usable(const SolveReport& report, const Refinement& refinement) {
+  const double rounding = 16 * std::numeric_limits<double>::epsilon();
+  return report.backward <= rounding || report.residual <= std::max(refinement.tolerance, 1e-12);
+}
+
 } // namespace
 
 Factor::Factor(Kind kind) : state_(std::make_unique<State>()) {
   state_->kind = kind;
-  state_->backend = kind == Kind::Unsymmetric ? make_umfpack() : make_cholmod(kind);
+  state_->backend = kind == Kind::Cholesky ? make_cholmod(kind) : make_supernodal(kind);
 }
 Factor::Factor(Factor&&) noexcept = default;
 Factor& Factor::operator=(Factor&&) noexcept = default;
@@ -92,7 +105,7 @@ void Factor::analyse(const CscPattern& pattern) {
                      (pattern.lower ? "full matrix" : "lower triangle") +
                      " for this kind of factor, got the other; reduce with storage(kind)");
   State& s = *state_;
-  s.analysed = s.factorised = false;
+  s.analysed = s.factorised = s.reserve_analysed = false;
   s.pattern = pattern;
   s.values.resize(pattern.nonzeros());
   for (Vector* work : {&s.rhs, &s.residual, &s.correction, &s.trial})
@@ -112,11 +125,53 @@ FactorStatus Factor::factorise(const ConstVector& values) {
   if (!s.values.allFinite()) return {FactorStatus::Cause::NotFinite, -1};
   FactorStatus status;
   if (!s.empty()) {
-    const BlasThreads threads(blas_threads(s.backend->flops()));
-    status = s.backend->factorise(s.values.data());
+    status = s.factorise_with(*s.backend);
+    if (status.ok() && s.backend->raised_pivots() > 0 && !s.probe()) status = s.fall_back();
   }
   s.factorised = status.ok();
   return status;
+}
+
+FactorStatus Factor::State::factorise_with(Backend& chosen) {
+  const BlasThreads threads(blas_threads(chosen.flops()));
+  active = &chosen;
+  return chosen.factorise(values.data());
+}
+
+FactorStatus Factor::State::fall_back() {
+  if (!reserve) reserve = make_umfpack();
+  if (!reserve_analysed) reserve->analyse(pattern);
+  reserve_analysed = true;
+  return factorise_with(*reserve);
+}
+
+/// Does the factor, with pivots raised, still serve a right-hand side that spares no unknown?
+bool Factor::State::probe() {
+  for (Eigen::Index i = 0; i < rhs.size(); ++i)
+    rhs[i] = 1.0 + 0.5 * std::sin(static_cast<double>(i));
+  Vector x(rhs.size());
+  return usable(refine(x, {}), {});
+}
+
+/// x = A⁻¹ rhs by the active factor, refined.
+SolveReport Factor::State::refine(MutableVector x, const Refinement& refinement) {
+  const BlasThreads threads(blas_threads(active->flops()));
+  active->solve(rhs.data(), trial.data());
+  x = trial;
+  subtract_product(pattern, values, trial, rhs, residual);
+  SolveReport report = measure(residual, trial, rhs, norm, 0);
+  while (report.steps < refinement.max_steps && !good_enough(report, refinement)) {
+    active->solve(residual.data(), correction.data());
+    trial += correction;
+    subtract_product(pattern, values, trial, rhs, residual);
+    const SolveReport next = measure(residual, trial, rhs, norm, report.steps + 1);
+    if (!(next.backward < report.backward)) break;
+    const bool stalled = next.backward > report.backward / 2;
+    x = trial;
+    report = next;
+    if (stalled) break;
+  }
+  return report;
 }
 
 SolveReport Factor::solve(const ConstVector& rhs, MutableVector x, const Refinement& refinement) {
@@ -126,24 +181,31 @@ SolveReport Factor::solve(const ConstVector& rhs, MutableVector x, const Refinem
   require_size("rhs", rhs.size(), s.pattern.size, "give one entry for each unknown");
   require_size("x", x.size(), s.pattern.size, "give one entry for each unknown");
   if (s.empty()) return {};
-  const BlasThreads threads(blas_threads(s.backend->flops()));
   s.rhs = rhs; // x may be the same vector
-  s.backend->solve(s.rhs.data(), s.trial.data());
-  x = s.trial;
-  subtract_product(s.pattern, s.values, s.trial, s.rhs, s.residual);
-  SolveReport report = measure(s.residual, s.trial, s.rhs, s.norm, 0);
-  while (report.steps < refinement.max_steps && !good_enough(report, refinement)) {
-    s.backend->solve(s.residual.data(), s.correction.data());
-    s.trial += s.correction;
-    subtract_product(s.pattern, s.values, s.trial, s.rhs, s.residual);
-    const SolveReport next = measure(s.residual, s.trial, s.rhs, s.norm, report.steps + 1);
-    if (!(next.backward < report.backward)) break;
-    const bool stalled = next.backward > report.backward / 2;
-    x = s.trial;
-    report = next;
-    if (stalled) break;
+  const SolveReport report = s.refine(x, refinement);
+  const bool chosen_pivots = s.kind == Kind::Cholesky || s.active != s.backend.get();
+  if (chosen_pivots || refinement.max_steps == 0 || usable(report, refinement)) return report;
+  if (!s.fall_back().ok()) {
+    s.active = s.backend.get();
+    return report;
   }
-  return report;
+  Vector other(x.size());
+  const SolveReport second = s.refine(other, refinement);
+  if (second.backward >= report.backward) return report; // false where one is no number
+  x = other;
+  return second;
+}
+
+void Factor::apply_inverse(const ConstVector& rhs, MutableVector x) {
+  State& s = *state_;
+  if (!s.factorised)
+    throw StateError("apply_inverse needs a factor; call factorise and look at its status first");
+  require_size("rhs", rhs.size(), s.pattern.size, "give one entry for each unknown");
+  require_size("x", x.size(), s.pattern.size, "give one entry for each unknown");
+  if (s.empty()) return;
+  const BlasThreads threads(blas_threads(s.active->flops()));
+  s.rhs = rhs; // x may be the same vector
+  s.active->solve(s.rhs.data(), x.data());
 }
 
 Inertia Factor::inertia() const {
@@ -151,6 +213,10 @@ Inertia Factor::inertia() const {
     throw StateError(
         "inertia needs a factor of kind QuasiDefinite; factorise one and look at its status");
   return state_->empty() ? Inertia{} : state_->backend->inertia();
+}
+
+bool Factor::fell_back() const {
+  return state_->reserve && state_->active == state_->reserve.get();
 }
 
 Kind Factor::kind() const {

@@ -19,6 +19,8 @@ class Backend {
   /// x = A⁻¹ rhs, without refinement; both (size).
   virtual void solve(const double* rhs, double* x) = 0;
   virtual Inertia inertia() const = 0;
+  /// Pivots that were too small and that the last factorise replaced: A⁻¹ is then only near.
+  virtual std::int64_t raised_pivots() const { return 0; }
 
   virtual double flops() const = 0;
   virtual double nonzeros() const = 0;
@@ -27,5 +29,6 @@ class Backend {
 
 std::unique_ptr<Backend> make_cholmod(Kind kind);
 std::unique_ptr<Backend> make_umfpack();
+std::unique_ptr<Backend> make_supernodal(Kind kind);
 
 } // namespace supple

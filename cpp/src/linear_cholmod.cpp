@@ -1,92 +1,14 @@
-/// Symmetric factorisations by CHOLMOD: supernodal LLᵀ and simplicial LDLᵀ.
-#include <cholmod.h>
-#include <omp.h>
-
+/// Symmetric factorisations by CHOLMOD: supernodal LLᵀ, and simplicial LDLᵀ as a reference for
+/// tests: it is right and slow.
 #include <algorithm>
 #include <cmath>
 
-#include "group_graph.hpp"
+#include "cholmod_library.hpp"
 #include "linear_backend.hpp"
 #include "suitesparse.hpp"
 
 namespace supple {
 namespace {
-
-/// Keeps CHOLMOD from opening OpenMP threads of its own, which would fight for the cores with ours.
-/// Before CHOLMOD 5 their number (4) is compiled in and only the nesting limit holds it; from
-/// CHOLMOD 5 on Common.nthreads_max does.
-struct SerialOpenMp {
-#if CHOLMOD_MAIN_VERSION < 5
-  int levels = omp_get_max_active_levels();
-  SerialOpenMp() { omp_set_max_active_levels(0); }
-  ~SerialOpenMp() { omp_set_max_active_levels(levels); }
-#else
-  SerialOpenMp() {}
-  ~SerialOpenMp() {}
-#endif
-  SerialOpenMp(const SerialOpenMp&) = delete;
-  SerialOpenMp& operator=(const SerialOpenMp&) = delete;
-};
-
-/// CHOLMOD's settings, work space and results, freed in the right order.
-struct Library {
-  cholmod_common common;
-  cholmod_factor* factor = nullptr;
-  cholmod_dense* x = nullptr;
-  cholmod_dense* y = nullptr;
-  cholmod_dense* e = nullptr;
-
-  explicit Library(Kind kind) {
-    cholmod_l_start(&common);
-    common.print = 0;
-    common.error_handler = nullptr;
-    common.supernodal = kind == Kind::Cholesky ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
-    common.final_ll = 0;
-    common.quick_return_if_not_posdef = 1;
-    common.nmethods = 1;
-    common.method[0].ordering = CHOLMOD_GIVEN;
-    common.postorder = 1;
-#if CHOLMOD_MAIN_VERSION >= 5
-    common.nthreads_max = 1;
-#endif
-  }
-  ~Library() {
-    release();
-    cholmod_l_finish(&common);
-  }
-  Library(const Library&) = delete;
-  Library& operator=(const Library&) = delete;
-
-  void release() {
-    cholmod_l_free_factor(&factor, &common);
-    for (cholmod_dense** d : {&x, &y, &e})
-      cholmod_l_free_dense(d, &common);
-  }
-
-  /// A negative status is an error; a positive one (not positive definite) is an answer.
-  void require_ok(const char* stage) const {
-    if (common.status >= CHOLMOD_OK) return;
-    const bool memory =
-        common.status == CHOLMOD_OUT_OF_MEMORY || common.status == CHOLMOD_TOO_LARGE;
-    throw library_error("CHOLMOD", stage, common.status, memory);
-  }
-};
-
-/// CHOLMOD's header on a lower triangle of ours; CHOLMOD does not write through it.
-cholmod_sparse lower_view(const std::vector<std::int64_t>& start,
-                          const std::vector<std::int64_t>& row) {
-  cholmod_sparse a{};
-  a.nrow = a.ncol = start.size() - 1;
-  a.nzmax = row.size();
-  a.p = const_cast<std::int64_t*>(start.data());
-  a.i = const_cast<std::int64_t*>(row.data());
-  a.stype = -1;
-  a.itype = CHOLMOD_LONG;
-  a.xtype = CHOLMOD_PATTERN;
-  a.dtype = CHOLMOD_DOUBLE;
-  a.sorted = a.packed = 1;
-  return a;
-}
 
 /// CHOLMOD's header on a vector of ours; CHOLMOD does not write through it.
 cholmod_dense vector_view(const double* values, std::size_t size) {
@@ -101,22 +23,12 @@ cholmod_dense vector_view(const double* values, std::size_t size) {
 
 class Cholmod final : public Backend {
  public:
-  explicit Cholmod(Kind kind) : kind_(kind), lib_(kind) {}
+  explicit Cholmod(Kind kind)
+      : kind_(kind), lib_(kind == Kind::Cholesky ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL) {}
 
   void analyse(const CscPattern& pattern) override {
-    const SerialOpenMp serial;
-    lib_.release();
     matrix_ = lower_view(pattern.start, pattern.row);
-    const GroupGraph graph(pattern);
-    cholmod_sparse nodes = lower_view(graph.start, graph.row);
-    std::vector<std::int64_t> order(nodes.nrow);
-    if (cholmod_l_amd(&nodes, nullptr, 0, as_long(order), &lib_.common) != 0)
-      keep_if_better(graph.expand(order), "AMD");
-#ifndef NPARTITION
-    if (cholmod_l_metis(&nodes, nullptr, 0, 1, as_long(order), &lib_.common) != 0)
-      keep_if_better(graph.expand(order), "METIS");
-#endif
-    if (lib_.factor == nullptr) lib_.require_ok("analysis");
+    lib_.analyse(pattern);
   }
 
   FactorStatus factorise(double* values) override {
@@ -163,28 +75,14 @@ class Cholmod final : public Backend {
     return result;
   }
 
-  double flops() const override { return flops_; }
-  double nonzeros() const override { return nonzeros_; }
-  const char* ordering() const override { return ordering_; }
+  double flops() const override { return lib_.flops; }
+  double nonzeros() const override { return lib_.nonzeros; }
+  const char* ordering() const override { return lib_.ordering; }
 
  private:
-  void keep_if_better(std::vector<std::int64_t> order, const char* name) {
-    cholmod_factor* factor =
-        cholmod_l_analyze_p(&matrix_, as_long(order), nullptr, 0, &lib_.common);
-    if (factor != nullptr && (lib_.factor == nullptr || lib_.common.fl < flops_)) {
-      std::swap(factor, lib_.factor);
-      flops_ = lib_.common.fl;
-      nonzeros_ = lib_.common.lnz;
-      ordering_ = name;
-    }
-    cholmod_l_free_factor(&factor, &lib_.common);
-  }
-
   Kind kind_;
-  Library lib_;
+  CholmodLibrary lib_;
   cholmod_sparse matrix_{};
-  double flops_ = 0.0, nonzeros_ = 0.0;
-  const char* ordering_ = "none";
 };
 
 } // namespace

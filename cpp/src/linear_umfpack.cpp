@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "linear_backend.hpp"
@@ -17,6 +19,41 @@ void require_ok(int status, const char* stage) {
     throw library_error("UMFPACK", stage, status, status == UMFPACK_ERROR_out_of_memory);
 }
 
+/// A symmetric matrix in full, from its lower triangle.
+struct Mirror {
+  CscPattern full;
+  std::vector<std::int64_t> source; ///< of each entry, in the lower triangle
+  std::vector<double> values;
+
+  explicit Mirror(const CscPattern& lower) {
+    std::vector<std::vector<std::pair<std::int64_t, std::int64_t>>> column(
+        static_cast<std::size_t>(lower.size)); // rows ascend: those above come from earlier columns
+    for (std::int64_t c = 0; c < lower.size; ++c)
+      for (std::int64_t k = lower.start[static_cast<std::size_t>(c)];
+           k < lower.start[static_cast<std::size_t>(c) + 1]; ++k) {
+        const std::int64_t r = lower.row[static_cast<std::size_t>(k)];
+        column[static_cast<std::size_t>(c)].emplace_back(r, k);
+        if (r != c) column[static_cast<std::size_t>(r)].emplace_back(c, k);
+      }
+    full.size = lower.size;
+    full.start.push_back(0);
+    for (const auto& entries : column) {
+      for (const auto& [row, k] : entries) {
+        full.row.push_back(row);
+        source.push_back(k);
+      }
+      full.start.push_back(full.nonzeros());
+    }
+    values.resize(source.size());
+  }
+
+  double* fill(const double* lower) {
+    for (std::size_t k = 0; k < source.size(); ++k)
+      values[k] = lower[source[k]];
+    return values.data();
+  }
+};
+
 class Umfpack final : public Backend {
  public:
   Umfpack() {
@@ -30,7 +67,8 @@ class Umfpack final : public Backend {
 
   void analyse(const CscPattern& pattern) override {
     release();
-    pattern_ = &pattern;
+    mirror_ = pattern.lower ? std::make_unique<Mirror>(pattern) : nullptr;
+    pattern_ = mirror_ ? &mirror_->full : &pattern;
     const auto n = static_cast<std::size_t>(pattern.size);
     work_int_.resize(n);
     work_.resize(5 * n);
@@ -43,9 +81,10 @@ class Umfpack final : public Backend {
 
   FactorStatus factorise(double* values) override {
     umfpack_dl_free_numeric(&numeric_);
-    values_ = values;
-    const auto status = umfpack_dl_numeric(as_long(pattern_->start), as_long(pattern_->row), values,
-                                           symbolic_, &numeric_, control_.data(), info_.data());
+    values_ = mirror_ ? mirror_->fill(values) : values;
+    const auto status =
+        umfpack_dl_numeric(as_long(pattern_->start), as_long(pattern_->row), values_, symbolic_,
+                           &numeric_, control_.data(), info_.data());
     require_ok(static_cast<int>(status), "factorisation");
     flops_ = info_[UMFPACK_FLOPS];
     nonzeros_ = info_[UMFPACK_LNZ] + info_[UMFPACK_UNZ];
@@ -100,6 +139,7 @@ class Umfpack final : public Backend {
 
   std::array<double, UMFPACK_CONTROL> control_{};
   std::array<double, UMFPACK_INFO> info_{};
+  std::unique_ptr<Mirror> mirror_; // where the pattern given is a lower triangle
   const CscPattern* pattern_ = nullptr;
   const double* values_ = nullptr;
   void* symbolic_ = nullptr;

@@ -74,6 +74,20 @@ Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage)
   return reduction;
 }
 
+std::vector<Index> mirror(const BlockPattern& pattern, const Reduction& reduction) {
+  if (!reduction.pattern.lower)
+    throw ShapeError("mirror wants a reduction to the lower triangle, got the full matrix; "
+                     "reduce with Storage::Lower");
+  std::vector<Index> position(reduction.source.size());
+  const CscPattern& csc = reduction.pattern;
+  std::vector<std::int64_t> next(csc.start.begin(), csc.start.end() - 1);
+  for_free_entries(pattern, reduction, [&](Index row, Index column, Index at) {
+    if (column > row) return;
+    position[static_cast<std::size_t>(next[static_cast<std::size_t>(column)]++)] = at;
+  });
+  return position;
+}
+
 void Reduction::gather(const ConstVector& values, MutableVector reduced) const {
   require_size("values", values.size(), full_nonzeros, "assemble them on the reduced pattern");
   require_size("reduced", reduced.size(), pattern.nonzeros(), "size it as pattern.nonzeros()");

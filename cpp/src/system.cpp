@@ -1,27 +1,13 @@
 #include "supple/system.hpp"
 
-#include <chrono>
+#include <limits>
 
+#include "stopwatch.hpp"
 #include "supple/error.hpp"
 
 namespace supple {
 
 namespace {
-
-/// Adds the seconds of its own life to a counter.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& total) : total_(total) {}
-  ~Stopwatch() {
-    total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& total_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 double factor_of(const Term& term, double load_factor) {
   return term.is_load ? load_factor : 1.0;
@@ -33,8 +19,21 @@ void System::add(std::shared_ptr<Term> term) {
   terms_.push_back(std::move(term));
   pattern_.reset();
   reduction_.reset();
+  forget_factors();
+}
+
+void System::forget_factors() {
   factor_.reset();
   indefinite_.reset();
+  inverse_.reset();
+}
+
+void System::use_gmres(bool gmres) {
+  if (inverse_) inverse_->forget();
+  if (gmres == gmres_) return;
+  gmres_ = gmres;
+  reduction_.reset();
+  forget_factors();
 }
 
 void System::move_points(const ConstVector& points) {
@@ -47,8 +46,7 @@ void System::set_free(Mask free) {
   if (free_.size() == free.size() && (free_ == free).all()) return;
   free_ = std::move(free);
   reduction_.reset();
-  factor_.reset();
-  indefinite_.reset();
+  forget_factors();
 }
 
 bool System::has_energy() const {
@@ -111,6 +109,7 @@ const BlockPattern& System::pattern() {
 const Vector& System::assemble_tangent(const ConstVector& u, double load_factor) {
   const BlockPattern& p = pattern();
   const Stopwatch watch(timings.assembly);
+  at_ = u;
   values_.setZero(p.nonzeros());
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const double scale = factor_of(*terms_[t], load_factor);
@@ -122,13 +121,15 @@ const Vector& System::assemble_tangent(const ConstVector& u, double load_factor)
 const Reduction& System::reduction() {
   if (!reduction_) {
     if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
-    reduction_ = std::make_unique<Reduction>(reduce(pattern(), free_, storage(kind())));
+    const Storage part = iterates() ? Storage::Lower : storage(kind());
+    reduction_ = std::make_unique<Reduction>(reduce(pattern(), free_, part));
   }
   return *reduction_;
 }
 
 FactorStatus System::factorise(double shift) {
   const Reduction& r = reduction();
+  if (iterates()) return prepare_inverse();
   const Stopwatch watch(timings.factor);
   if (!factor_) {
     factor_ = std::make_unique<Factor>(kind());
@@ -148,7 +149,24 @@ FactorStatus System::factorise(double shift) {
     }
   }
   current_ = factor_.get();
+  ++timings.factorisations;
   return factor_->factorise(reduced_);
+}
+
+FactorStatus System::prepare_inverse() {
+  if (!inverse_) inverse_ = std::make_unique<InverseSolver>(pattern(), reduction(), *points_);
+  const FactorStatus status = inverse_->prepare(values_, at_);
+  count_work();
+  return status;
+}
+
+void System::count_work() {
+  SolverWork& work = inverse_->work;
+  timings.factor += work.factor;
+  timings.solve += work.solve;
+  timings.factorisations += work.symmetric + work.lu;
+  timings.krylov_iterations += work.iterations;
+  work = {};
 }
 
 FactorStatus System::factorise_indefinite() {
@@ -161,16 +179,23 @@ FactorStatus System::factorise_indefinite() {
   reduced_.resize(r.pattern.nonzeros());
   r.gather(values_, reduced_);
   current_ = indefinite_.get();
+  ++timings.factorisations;
   return indefinite_->factorise(reduced_);
 }
 
-Vector System::solve(const ConstVector& rhs) {
+Vector System::solve(const ConstVector& rhs, double tolerance) {
   const Reduction& r = reduction();
-  const Stopwatch watch(timings.solve);
   Vector x(r.free());
-  Refinement refinement;
-  refinement.tolerance = 1e-12;
-  current_->solve(r.restrict(rhs), x, refinement);
+  if (iterates()) {
+    if (!inverse_->solve(r.restrict(rhs), tolerance, x))
+      x.setConstant(std::numeric_limits<double>::quiet_NaN());
+    count_work();
+  } else {
+    const Stopwatch watch(timings.solve);
+    Refinement refinement;
+    refinement.tolerance = 1e-12;
+    current_->solve(r.restrict(rhs), x, refinement);
+  }
   Vector full = Vector::Zero(dofs());
   r.add_to(x, 1.0, full);
   return full;

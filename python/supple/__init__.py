@@ -20,8 +20,12 @@ if TYPE_CHECKING:
     from .laws import materials as materials
     from .mesh import Mesh as Mesh
     from .mesh import Tag as Tag
-    from .round_trip import reversed_gravity_error as reversed_gravity_error
-    from .round_trip import round_trip_error as round_trip_error
+    from .overlap import overlapping as overlapping
+    from .prestress import Prestress as Prestress
+    from .rest_check import RoundTrip as RoundTrip
+    from .rest_check import reversed_gravity_error as reversed_gravity_error
+    from .rest_check import round_trip as round_trip
+    from .rest_check import round_trip_error as round_trip_error
     from .state import Rest as Rest
     from .state import State as State
     from .surface import Surface as Surface
@@ -32,7 +36,9 @@ _HOME = {
     "Body": "body",
     "Material": "laws",
     "Mesh": "mesh",
+    "Prestress": "prestress",
     "Rest": "state",
+    "RoundTrip": "rest_check",
     "State": "state",
     "Surface": "surface",
     "Tag": "mesh",
@@ -41,8 +47,10 @@ _HOME = {
     "fit": "author.fit",
     "material": "laws",
     "materials": "laws",
-    "reversed_gravity_error": "round_trip",
-    "round_trip_error": "round_trip",
+    "overlapping": "overlap",
+    "reversed_gravity_error": "rest_check",
+    "round_trip": "rest_check",
+    "round_trip_error": "rest_check",
     "sensitivity": "sensitivity",
 }
 

@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from . import body_checks as checks
-from . import fixed_point, newton, parameters, supports, terms
+from . import failures, newton, parameters, rest_shape, supports, terms
 from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
-from .state import Rest, State, outcome
+from .state import Equilibrium, Rest, State, outcome
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from .surface import Surface
 
 Floats = npt.NDArray[np.float64]
-
-METHODS = ("inverse", "reversed-gravity", *fixed_point.METHODS)
 
 
 class Body:
@@ -171,6 +169,9 @@ class Body:
     ) -> Body:
         """Hold the nodes of ``where`` to a rigid surface, free to slide on it.
 
+        A rest shape and a solve on it come back to the shape given but for the depth to which the
+        nodes sink in, compliance × force.
+
         Args:
             compliance: m/N of the whole region, shared by tributary area; of each node if
                 ``per_node`` (Mazier 2022 uses 1e-8 m/N).
@@ -254,7 +255,7 @@ class Body:
             raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         result, built = self._run(settings, None if start is None else self._start(start))
-        newton.require_converged(result, built, self._description)
+        failures.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
         return State(
             **outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct"
@@ -264,11 +265,15 @@ class Body:
         self,
         method: str = "inverse",
         density_of: str = "rest",
+        directions_of: str = "rest",
+        start: Rest | None = None,
         load_steps: int | None = None,
         rtol: float = 1e-10,
         atol: float | None = None,
         max_iterations: int = 25,
+        solver: str = "auto",
         progress: Progress | None = None,
+        check_overlap: bool = False,
         **fixed_point_options: Any,
     ) -> Rest:
         """The shape without the loads, taking the mesh for the loaded shape.
@@ -278,31 +283,29 @@ class Body:
                 (forward solves until the loaded shape is met); or "reversed-gravity" (approximate:
                 the loads act the other way on the loaded shape; Mazier 2022, chapter 5).
             density_of: the state, "rest" or "loaded", that `density` counts in.
+            directions_of: the state, "rest" or "loaded", in which the laws' directions (fibres) lie
+                as given. An image of the loaded shape shows "loaded" ones; those at rest are then
+                found with the shape: f0 along F̄⁻¹ f, F̄ a cell's average deformation gradient.
+                Either way `Rest.body` has those at rest.
+            start: a rest shape of this mesh to start from, as after a small change of the body;
+                from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
+            solver: of the inverse's unsymmetric tangents: "gmres" on few symmetric factorisations,
+                LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres".
+            check_overlap: refuse a rest shape of which two parts are in one place
+                (`supple.overlap.overlapping`); one with cells inside out is always refused.
             **fixed_point_options: of the methods of "sellier": `fixed_point.FixedPoint`.
 
         Raises:
             InputError: as in `solve`.
-            ConvergenceError: there is no such rest shape, or none was found, with the cause.
+            ConvergenceError: there is no such rest shape, or none was found, with the cause; or
+                the directions at rest do not settle.
         """
-        if method not in METHODS:
-            raise InputError(f"method must be one of {METHODS}, got {method!r}.")
-        if density_of not in ("rest", "loaded"):
-            raise InputError(f'density_of must be "rest" or "loaded", got {density_of!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
-        chosen = fixed_point.options(fixed_point_options, method)
-        if method in fixed_point.METHODS:
-            return fixed_point.rest_shape(self, method, settings, chosen, density_of)
-        if method == "inverse":
-            result, built = self._run(settings, inverse=True, density_of=density_of)
-        else:
-            result, built = self._reversed()._run(settings)
-        newton.require_converged(result, built, self._description, inverse=True)
-        solved = terms.snapshot(self._description)
-        fields = outcome(result, built, self._description, self._fixed)
-        rest = Rest(**fields, _solved=solved, _form="inverse", method=method, density_of=density_of)
-        newton.require_usable(rest)
-        return rest
+        asked = rest_shape.Request(
+            method, density_of, directions_of, solver, check_overlap, settings, fixed_point_options
+        )
+        return rest_shape.find(self, asked, start)
 
     def on(self, mesh: Mesh) -> Body:
         """The same laws, supports and loads on a moved copy of the mesh, such as ``rest.mesh``."""
@@ -324,6 +327,13 @@ class Body:
 
     # Inside
 
+    def _weighed_in(self, state: str) -> Body:
+        """A copy, its density that at rest or its nodes with the masses of the loaded shape."""
+        body = self.on(self.mesh)
+        if state == "loaded" and body._description.masses is None:
+            body._description.masses = terms.nodal_masses(self._description)
+        return body
+
     def _reversed(self) -> Body:
         body = self.on(self.mesh)
         d = body._description
@@ -339,6 +349,8 @@ class Body:
         start: Floats | None = None,
         inverse: bool = False,
         density_of: str = "rest",
+        gmres: bool = False,
+        judge: newton.Judge | None = None,
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
         native.warm = start is not None
@@ -349,13 +361,22 @@ class Body:
         native.refuse_inversion = inverse or len(barriers) < len(laws)
         scalars = np.zeros(built.system.scalars)
         built.system.set_free(np.append(~self._fixed.ravel(), scalars == 0))
+        built.system.use_gmres(gmres)
         built.system.reset_timings()
         target = np.append(-self._prescribed if inverse else self._prescribed, scalars)
         if start is None:
             start = np.zeros_like(target)
         else:
             start[self._prescribed.size :] /= built.scalar_unit
-        return newton.solve(built.system, start, target, native, settings), built
+        return newton.solve(built.system, start, target, native, settings, judge), built
+
+    def _unstable_directions(self, u: Floats) -> int:
+        """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
+        if self._description.pressures:
+            return 0
+        system = self._system().system
+        system.set_free(np.append(~self._fixed.ravel(), np.ones(system.scalars, bool)))
+        return int(system.unstable_directions(u))
 
     def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
         key = (inverse, density_of if inverse else "rest")
@@ -383,7 +404,7 @@ class Body:
             normals |= dict(zip(slide.nodes.tolist(), landed.normal, strict=True))
         return normals
 
-    def _start(self, start: State) -> Floats:
+    def _start(self, start: Equilibrium) -> Floats:
         if start.u.shape != self._prescribed.shape:
             raise InputError(
                 f"start must be a state of this mesh with {len(self.mesh.points)} nodes, "

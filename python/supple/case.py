@@ -125,7 +125,7 @@ class Table:
         """The table [key], which must be there."""
         value = self._get(key, None)
         if isinstance(value, Mapping):
-            return Table(value, self.file, self._below(key))
+            return type(self)(value, self.file, self._below(key))
         raise self.wrong(key, f"a table, written [{self._below(key)}]", value)
 
     def tables(self, key: str) -> list[Table]:
@@ -136,7 +136,7 @@ class Table:
         if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
             raise self.wrong(key, f"a list of tables, each written [[{self._below(key)}]]", value)
         names = (f"{self._below(key)} {number}" for number in range(1, len(value) + 1))
-        return [Table(item, self.file, name) for item, name in zip(value, names, strict=True)]
+        return [type(self)(item, self.file, name) for item, name in zip(value, names, strict=True)]
 
     def numbers(self, sizes: Mapping[str, int]) -> dict[str, Any]:
         """The keys of `sizes` that are there, as one or several finite numbers; no other key."""

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 
 class SuppleError(Exception):
@@ -30,6 +34,8 @@ class ConvergenceError(SuppleError):
         cells: ids of the worst cells, worst first (may be empty).
         load_factor: largest fraction of the load that was in equilibrium, 0 to 1.
         cause: likely cause, one phrase.
+        points: (n, 3) m, where the nodes are in the last equilibrium found, that at `load_factor`;
+            None where there is none to show.
     """
 
     def __init__(
@@ -39,9 +45,11 @@ class ConvergenceError(SuppleError):
         cells: Sequence[int] = (),
         load_factor: float = 0.0,
         cause: str = "",
+        points: npt.NDArray[np.float64] | None = None,
     ) -> None:
         super().__init__(message)
         self.history = list(history)
         self.cells = list(cells)
         self.load_factor = load_factor
         self.cause = cause
+        self.points = points

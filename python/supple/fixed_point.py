@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import newton, terms
+from . import failures, newton, terms
 from .acceleration import Acceleration, Aitken, Anderson, Relaxation
+from .choices import FIXED_POINTS
 from .errors import ConvergenceError, InputError, MeshError
 from .state import PHASES, Rest, outcome
 
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from .body import Body
 
 Floats = npt.NDArray[np.float64]
-
-METHODS = ("sellier", "sellier-aitken", "sellier-anderson")
 
 #: Times that a step to where no forward solve succeeds is halved.
 _CUTS = 4
@@ -77,10 +76,10 @@ def options(given: dict[str, Any], method: str) -> FixedPoint:
     """
     known = FixedPoint.__dataclass_fields__
     for name in given:
-        if name not in known or method not in METHODS:
+        if name not in known or method not in FIXED_POINTS:
             raise InputError(
-                f"rest_shape with method {method!r} takes no {name!r}; {', '.join(METHODS)} take "
-                f"{', '.join(known)}."
+                f"rest_shape with method {method!r} takes no {name!r}; "
+                f"{', '.join(FIXED_POINTS)} take {', '.join(known)}."
             )
     return FixedPoint(**given)
 
@@ -115,16 +114,8 @@ class Forward:
         self.history: list[dict[str, float]] = []
         self.timings = dict.fromkeys(PHASES, 0.0)
         self.solves = 0
-        self._body = body.on(body.mesh)
-        if density_of == "loaded":
-            self._weigh()
+        self.body = body._weighed_in(density_of)
         self._scalars = np.zeros(len(terms.pressure_nodes(body._description)))  # Pa
-
-    def _weigh(self) -> None:
-        """Weight that does not change with the rest shape: dead forces, those of the loaded one."""
-        d, still = self._body._description, np.zeros(self.target.size)
-        weight = -self._body._system().body_force.residual(still).reshape(-1, 3)
-        d.forces, d.gravity = d.forces + weight, np.zeros(3)
 
     def shoot(self, points: Floats, settings: newton.Settings, near: bool = False) -> Shot:
         """Solve from rest at ``points`` (n, 3) m, from zero or if ``near`` from the loaded shape.
@@ -132,8 +123,8 @@ class Forward:
         Raises:
             ConvergenceError: no equilibrium. MeshError: ``points`` have inverted cells.
         """
-        body = self._body.on(self._body.mesh.moved(points))
-        body._built = self._body._built
+        body = self.body.on(self.body.mesh.moved(points))
+        body._built = self.body._built
         for built in body._built.values():
             built.system.move_points(np.ascontiguousarray(points).ravel())
         self.solves += 1
@@ -146,7 +137,7 @@ class Forward:
             self.timings[name] += getattr(built.system.timings, name)
         rows = [newton.as_dict(i) | {"solve": float(self.solves)} for i in result.history]
         self.history += rows
-        newton.require_converged(result, built, body._description)
+        failures.require_converged(result, built, body._description)
         flat, n = result.u, self.target.size
         self._scalars = flat[n:] * built.scalar_unit
         points = body.mesh.points
@@ -157,15 +148,21 @@ class Forward:
 
 
 def rest_shape(
-    body: Body, method: str, settings: newton.Settings, chosen: FixedPoint, density_of: str
+    body: Body,
+    method: str,
+    settings: newton.Settings,
+    chosen: FixedPoint,
+    density_of: str,
+    start: Rest | None,
 ) -> Rest:
-    """The rest shape by one of `METHODS`; `Body.rest_shape` says the rest.
+    """The rest shape by one of `FIXED_POINTS`; `Body.rest_shape` says the rest.
 
     Raises:
         ConvergenceError: the fixed point diverges or stalls, or a forward solve fails.
     """
     forward, misses = Forward(body, density_of), list[float]()
-    shot = _search(body, forward, method, settings, chosen, misses)
+    trial = forward.target if start is None else start.points
+    shot = _search(forward, trial, method, settings, chosen, misses)
     fields = outcome(shot.result, shot.built, body._description, body._fixed) | {
         "u": shot.points - forward.target,
         "iterations": sum(1 for row in forward.history if row["iteration"] > 0),
@@ -175,16 +172,16 @@ def rest_shape(
     solved = terms.snapshot(body._description)
     return Rest(
         **fields, _solved=solved, _form="inverse", method=method, density_of=density_of,
-        solves=forward.solves, misses=tuple(misses),
+        solves=forward.solves, misses=tuple(misses), _body=forward.body.on(body.mesh),
     )  # fmt: skip
 
 
 def _search(
-    body: Body, forward: Forward, method: str, settings: newton.Settings, chosen: FixedPoint,
+    forward: Forward, trial: Floats, method: str, settings: newton.Settings, chosen: FixedPoint,
     misses: list[float],
 ) -> Shot:  # fmt: skip
     """Iterate until a shot meets every node; its misses are added to ``misses``."""
-    acceleration, trial = chosen.acceleration(method), forward.target
+    acceleration, body = chosen.acceleration(method), forward.body
     shot: Shot | None = None
     while True:
         worth = settings if chosen.exact else _worth(settings, misses)

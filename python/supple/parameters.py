@@ -21,8 +21,14 @@ def defaults(law: Law, count: int, skin: bool = False) -> dict[str, Floats]:
     """Each parameter's default as (count, size) rows; a skin keeps its volume: poisson is 0.5.
 
     Raises:
-        MaterialError: a skin's energy for a solid.
+        MaterialError: a skin's energy for a solid, or a law with directions for a skin.
     """
+    directed = [p.name for p in law.parameters if p.kind.size > 1]
+    if skin and directed:
+        raise MaterialError(
+            f"{law.name} has a direction, {directed[0]}, and cannot make a skin, which knows no "
+            "directions in its plane, at rest or loaded; use an isotropic law, such as fung_skin."
+        )
     if not skin and not law.solid:
         raise MaterialError(
             f"{law.name} is a skin's energy (psi_surface alone) and cannot make a solid; "

@@ -57,7 +57,8 @@ def sensitivity(
 
     Raises:
         MaterialError: no law has that parameter.
-        InputError: ``u`` has another shape; "points" of a body on sliding supports.
+        InputError: ``u`` has another shape; "points" of a body on sliding supports; "gravity" or
+            "density" of a body whose nodes have masses instead (`Rest.body`).
     """
     from .kernels.unit import SENSITIVITY
 
@@ -116,6 +117,11 @@ def _by_load(
     built: terms.Built, d: terms.Description, flat: Floats, by: str
 ) -> tuple[list[Piece], int]:
     """R is linear in each load, whose value of a cell is density · gravity or given as it is."""
+    if by in ("gravity", "density") and d.masses is not None:
+        raise InputError(
+            f"by {by!r} wants a body with a density; this one has masses of its nodes, from a rest "
+            'shape with density_of="loaded": take the sensitivity of the body that was given there.'
+        )
     if by == "gravity":
         force = _table(built.body_force, "d_value", flat, 3) * d.density[:, :, None]
         return [(built.body_force, force, np.tile(np.arange(3), (len(force), 1)))], 3

@@ -13,15 +13,17 @@ import numpy.typing as npt
 
 from . import terms
 from .errors import InputError
+from .prestress import Prestress, prestress, write_loaded
 from .projection import to_nodes
 
 if TYPE_CHECKING:
+    from .body import Body
     from .mesh import Mesh
 
 Floats = npt.NDArray[np.float64]
 
-#: Keys of `Equilibrium.timings`.
-PHASES = ("assembly", "factor", "solve", "total")
+#: Keys of `Equilibrium.timings`: seconds, then counts.
+PHASES = ("assembly", "factor", "solve", "total", "factorisations", "krylov_iterations")
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,8 @@ class Equilibrium:
         u: (n, 3) displacement of the nodes of the mesh that was solved on, m.
         iterations: Newton iterations over all load steps.
         history: one dict an iteration.
-        timings: seconds of "assembly", "factor", "solve", "total".
+        timings: seconds of "assembly", "factor", "solve", "total"; how many "factorisations" and
+            "krylov_iterations" there were.
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
@@ -114,12 +117,32 @@ class Equilibrium:
         J = np.asarray(np.linalg.det(self._values.F))
         return np.asarray(J.min(axis=1)) if at == "smallest" else self._at(J, at)
 
+    def directions(self, of: str = "rest") -> dict[str, Floats]:
+        """Directions of the laws, such as fibres: name → unit vectors (c, 3).
+
+        Args:
+            of: "rest", or "loaded" for those of the loaded shape, along F̄ f0 with F̄ the cell's
+                average deformation gradient. NaN in cells whose law has none of that name.
+
+        Raises:
+            InputError: another ``of``.
+        """
+        from . import directions
+
+        if of not in ("rest", "loaded"):
+            raise InputError(f'of must be "rest" or "loaded", got {of!r}.')
+        return directions.of(self, loaded=of == "loaded")
+
     def von_mises(self) -> Floats:
         """sqrt(3/2 s:s) of the averaged Cauchy stress (c,), Pa."""
         sigma = self.cauchy()
         mean = np.trace(sigma, axis1=1, axis2=2)[:, None, None] / 3
         deviator = sigma - mean * np.eye(3)
         return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))))
+
+    def prestress(self, at: str = "cells") -> Prestress:
+        """F, J and σ of the loaded shape together, ``at`` as in `deformation_gradient`."""
+        return prestress(self, at)
 
     def write(self, path: str | Path, cell_data: Mapping[str, npt.ArrayLike] | None = None) -> Path:
         """Write the moved shape as VTU with displacement, J and von Mises stress.
@@ -198,6 +221,7 @@ class Rest(Equilibrium):
     density_of: str = "rest"
     solves: int = 0
     misses: tuple[float, ...] = ()
+    _body: Body = field(repr=False, kw_only=True)  # on the loaded shape, with what is its at rest
 
     @property
     def loaded(self) -> Mesh:
@@ -206,8 +230,26 @@ class Rest(Equilibrium):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The rest shape; ``body.on(rest.mesh)`` is the same body on it."""
+        """The rest shape; `body` is the same body on it."""
         return self._solved.mesh.moved(self.points)
+
+    def body(self) -> Body:
+        """The body at rest: on `mesh`, with the laws, supports and loads of the one given.
+
+        Its directions are those at rest, whichever were given. Where the density counted in the
+        loaded shape, gravity pulls at its nodes with the masses that they had there. Solved, it
+        takes the loaded shape again.
+        """
+        return self._body.on(self.mesh)
+
+    def write_loaded(self, path: str | Path) -> Path:
+        """Write the loaded shape as VTU with what it carries: where a later simulation starts.
+
+        For each cell F (from rest to loaded) and the Cauchy stress as tensors, nine columns row by
+        row as ParaView reads them, J and von Mises stress: averages by rest volume as of
+        `prestress`. For each node the displacement to the rest shape, and a mixed form's pressure.
+        """
+        return write_loaded(self, path)
 
 
 def outcome(
@@ -226,7 +268,7 @@ def outcome(
         "timings": {n: getattr(t, n) for n in PHASES},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
-        "warnings": _warnings(built.system.volume_ratio(result.u)),
+        "warnings": _warnings(built.system.volume_ratio(result.u), result.fold),
     }
 
 
@@ -240,8 +282,16 @@ def _pressure(corners: Floats, d: terms.Description) -> Floats | None:
     return p
 
 
-def _warnings(smallest: Any) -> tuple[str, ...]:
-    """Laws whose energy stays finite at J = 0 are let through there, and told of here."""
-    if smallest.value > 0:
-        return ()
-    return (f"cells are inverted: the smallest J is {smallest.value:.3g}; use a law with ln J.",)
+def _warnings(smallest: Any, fold: float) -> tuple[str, ...]:
+    """Inverted cells, which laws with a finite energy at J = 0 let through, and folds passed."""
+    found = []
+    if smallest.value <= 0:
+        found.append(
+            f"cells are inverted: the smallest J is {smallest.value:.3g}; use a law with ln J."
+        )
+    if fold:
+        found.append(
+            f"the path passes a limit point at {100 * fold:.4g} % of the load, turns back and "
+            "comes to the whole load later: a body that is loaded slowly snaps there."
+        )
+    return tuple(found)

@@ -69,6 +69,7 @@ class Description:
     pressures: list[FacetLoad] = field(default_factory=list)
     skins: list[Region] = field(default_factory=list)  # ids are rows of `Mesh.boundary`
     slides: list[Slide] = field(default_factory=list)
+    masses: Floats | None = None  # (n,) kg of the nodes, instead of the density
 
 
 @dataclass
@@ -88,7 +89,7 @@ class Built:
     skins: list[list[FacetTerm]]
     tractions: list[list[FacetTerm]]
     pressures: list[list[FacetTerm]]
-    body_force: Any
+    body_force: Any  # None where the nodes have masses
     forces: Any
     scalar_unit: float = 1.0  # Pa/m, see KernelTerm::set_scalar_unit
 
@@ -109,9 +110,10 @@ def build(
         built.regions.append(region_term(system, d, region, form) if len(region.ids) else None)
         if built.regions[-1] is not None:
             built.regions[-1].set_scalar_unit(built.scalar_unit)
-    per_rest = inverse and density_of == "rest"
-    load = "body_force_rest" if per_rest else "body_force"
-    built.body_force = _load(system, load + suffix, d.mesh.element, _cells(d.mesh))
+    if d.masses is None:
+        per_rest = inverse and density_of == "rest"
+        load = "body_force_rest" if per_rest else "body_force"
+        built.body_force = _load(system, load + suffix, d.mesh.element, _cells(d.mesh))
     for traction in d.tractions:
         moved = (traction.per == "rest") == inverse
         unit = "traction_moved" if moved else "traction"
@@ -135,12 +137,25 @@ def refresh(built: Built, d: Description) -> None:
     for parts, skin in zip(built.skins, d.skins, strict=True):
         for part in parts:
             set_values(part.term, {n: v[part.rows] for n, v in skin.values.items()})
-    built.body_force.set_field("value", (d.density * d.gravity).ravel())
+    if built.body_force is not None:
+        built.body_force.set_field("value", (d.density * d.gravity).ravel())
     for parts, load in [*zip(built.tractions, d.tractions, strict=True),
                         *zip(built.pressures, d.pressures, strict=True)]:  # fmt: skip
         for part in parts:
             part.term.set_field("value", np.tile(load.value, len(part.rows)))
-    built.forces.set_forces(d.forces.ravel())
+    weight = 0.0 if d.masses is None else np.outer(d.masses, d.gravity)
+    built.forces.set_forces((d.forces + weight).ravel())
+
+
+def nodal_masses(d: Description) -> Floats:
+    """∫ ρ N_a dV of every node over the description's own mesh (n,), kg; gravity pulls at them."""
+    from .kernels.unit import Unit
+
+    system = new_system(d)
+    term = core().KernelTerm(compiled(Unit("body_force", d.mesh.element)), system, _cells(d.mesh))
+    term.set_field("value", (d.density * [1.0, 0.0, 0.0]).ravel())
+    force = -term.residual(np.zeros(d.mesh.points.size + system.scalars))
+    return np.asarray(force[: d.mesh.points.size].reshape(-1, 3)[:, 0])
 
 
 def new_system(d: Description) -> Any:

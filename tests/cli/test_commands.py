@@ -1,4 +1,4 @@
-"""`supple solve` and `rest-shape`, from files to files."""
+"""`supple solve`, from files to files; what `supple` says of itself."""
 
 from __future__ import annotations
 
@@ -95,15 +95,6 @@ def test_a_case_is_solved_as_the_same_lines_of_python(beam: Path, tmp_path: Path
     np.testing.assert_allclose(written.points, state.points, atol=1e-12)
 
 
-def test_the_rest_shape_of_a_solved_body_is_where_it_began(beam: Path, tmp_path: Path) -> None:
-    assert main(["solve", str(beam), "--out", str(tmp_path / "out")]) == 0
-    loaded = str(tmp_path / "out" / "deformed.vtu")
-    options = ["--set", "young=3e3", "--set", "poisson=0.3", "--fix", "x=min"]
-    assert main(["rest-shape", loaded, *options, "--out", str(tmp_path / "rest")]) == 0
-    rest = supple.Mesh.read(tmp_path / "rest" / "rest.vtu")
-    np.testing.assert_allclose(rest.points, box().points, atol=1e-9 * 0.04)
-
-
 def test_a_solve_that_does_not_converge_exits_3_and_writes_nothing(
     beam: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -113,16 +104,6 @@ def test_a_solve_that_does_not_converge_exits_3_and_writes_nothing(
     assert error["type"] == "ConvergenceError"
     assert error["history"]
     assert error["cause"]
-    assert list(tmp_path.iterdir()) == [beam]
-
-
-@pytest.mark.slow
-def test_a_body_too_soft_for_its_load_exits_3_and_writes_nothing(
-    beam: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    beam.write_text(BEAM.replace("young = 3e3", "young = 50.0"), encoding="utf-8")
-    assert main(["rest-shape", str(beam), "--json", "--out", str(tmp_path / "out")]) == 3
-    assert json.loads(capsys.readouterr().out)["error"]["type"] == "ConvergenceError"
     assert list(tmp_path.iterdir()) == [beam]
 
 
@@ -157,36 +138,6 @@ def test_a_wrong_case_gives_one_sentence_exit_2_and_no_file(
     assert message in shown.err
     assert len(shown.err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == [beam]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["absent.vtu"], "does not exist"),
-        (["absent.toml"], "is not a file"),
-        (["beam.toml", "--density", "900"], "--density goes with a MESH"),
-        (["beam.toml", "--fix", "x=min"], "--fix goes with a MESH"),
-        (
-            ["beam.vtu", "--set", "young"],
-            "--set must be NAME=VALUE, such as young=3e3, got 'young'",
-        ),
-        (["beam.vtu", "--set", "yuong=3e3"], 'yuong: unknown key; did you mean "young"?'),
-        (["beam.vtu", "--fix", "x=left"], 'where.x must be "min", "max"'),
-        (["beam.vtu", "--fix", "base"], "the mesh has no tag 'base'"),
-    ],
-)
-def test_wrong_options_of_rest_shape_are_bad_input(
-    beam: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    message: str,
-) -> None:
-    monkeypatch.chdir(beam.parent)
-    box().write("beam.vtu")
-    assert main(["rest-shape", *arguments, "--out", "out"]) == 2
-    assert message in capsys.readouterr().err
-    assert sorted(path.name for path in beam.parent.iterdir()) == ["beam.toml", "beam.vtu"]
 
 
 def test_version_is_the_one_of_the_package(root: Path, capsys: pytest.CaptureFixture[str]) -> None:

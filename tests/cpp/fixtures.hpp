@@ -38,6 +38,17 @@ inline Index box_nodes(int nx, int ny, int nz) {
   return (nx + 1) * (ny + 1) * (nz + 1);
 }
 
+/// (3n) coordinates of the nodes of box_tetrahedra, unit boxes.
+inline Vector box_points(int nx, int ny, int nz) {
+  Vector points(3 * box_nodes(nx, ny, nz));
+  Index n = 0;
+  for (int k = 0; k <= nz; ++k)
+    for (int j = 0; j <= ny; ++j)
+      for (int i = 0; i <= nx; ++i)
+        points.segment<3>(3 * n++) = Eigen::Vector3d(i, j, k);
+  return points;
+}
+
 /// Dense matrix of the CSR values, for comparison.
 inline Eigen::MatrixXd dense(const BlockPattern& pattern, const Vector& values) {
   Eigen::MatrixXd full = Eigen::MatrixXd::Zero(pattern.dofs(), pattern.dofs());

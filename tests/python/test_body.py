@@ -203,3 +203,16 @@ def test_a_body_on_a_moved_mesh_is_its_own():
     two.traction(right, (0.0, 0.0, -30.0)).set(young=2e3).gravity((0, 0, -1.0))
     two.skin(right, "neo_hookean", thickness=1e-3).fix(right)
     np.testing.assert_array_equal(one.solve().u, before)
+
+
+def test_a_rest_shape_starts_from_an_earlier_one():
+    """After a change of the modulus, the shape that a cold search finds; at once where it is it."""
+    b = body(young=2e3).fix(left).traction(right, (0.0, 0.0, -60.0))
+    first = b.rest_shape()
+    assert b.rest_shape(start=first).iterations <= 2
+    b.set(young=2.2e3)
+    cold, warm = b.rest_shape(), b.rest_shape(start=first)
+    np.testing.assert_allclose(warm.u, cold.u, atol=1e-10)
+    assert warm.iterations < cold.iterations
+    with pytest.raises(supple.InputError, match="start must be a rest shape"):
+        b.rest_shape(start=b.solve())

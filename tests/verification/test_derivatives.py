@@ -11,10 +11,11 @@ import pytest
 
 import supple
 from supple.body import unknowns
-from supple.kernels import build
 from supple.kernels.cells import ELEMENTS
 from supple.kernels.unit import FORMULATIONS, OFFERED, parse
 from supple.laws import folder, read_law
+
+pytestmark = pytest.mark.usefixtures("quick_compiler")
 
 
 def _text(law):
@@ -64,14 +65,6 @@ def per_cell(parameter, spread):
         return scaled if parameter.kind.admits(scaled) else parameter.default
     x, y, z = parameter.default
     return np.column_stack([x - spread * y, y + spread * x, z + 0 * spread])
-
-
-@pytest.fixture(autouse=True)
-def quick_compiler(request, monkeypatch):
-    """The slow ones without optimisation: the same C, in a quarter of the compiler's time."""
-    if request.node.get_closest_marker("slow"):
-        flags = tuple("-O0" if flag == "-O3" else flag for flag in build.FLAGS)
-        monkeypatch.setattr(build, "FLAGS", flags)
 
 
 @pytest.fixture

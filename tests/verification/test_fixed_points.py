@@ -7,7 +7,7 @@ import pytest
 
 import supple
 from supple.acceleration import Aitken, Anderson, Relaxation
-from supple.fixed_point import METHODS
+from supple.choices import FIXED_POINTS as METHODS
 
 YOUNG, AREA, LENGTH = 1e3, 1e-2, 0.5
 

@@ -6,8 +6,11 @@
 ///     reduction.gather(values, reduced);
 ///     if (FactorStatus status = factor.factorise(reduced); status.ok()) factor.solve(rhs, x);
 ///
-/// SuiteSparse's 64-bit interface throughout: a factor of a 3-D body has 10² to 10³ times the
-/// entries of its matrix and passes 2³¹ entries (16 GB) where the matrix itself is far from it.
+/// 64-bit offsets throughout: a factor of a 3-D body has 10² to 10³ times the entries of its matrix
+/// and passes 2³¹ entries (16 GB) where the matrix itself is far from it.
+///
+/// The multifrontal factors do not choose their pivots beyond a front. What that spoils, refinement
+/// repairs; where it does not, Factor falls back to UMFPACK, whose verdict and answer then count.
 #pragma once
 
 #include <memory>
@@ -19,8 +22,8 @@ namespace supple {
 /// What is known about the matrix, by the origin of its terms and never by trial.
 enum class Kind {
   Cholesky,      ///< symmetric positive definite: supernodal LLᵀ (CHOLMOD)
-  QuasiDefinite, ///< symmetric indefinite: simplicial LDLᵀ without pivoting, refined (CHOLMOD)
-  Unsymmetric    ///< LU with partial pivoting (UMFPACK)
+  QuasiDefinite, ///< symmetric indefinite: multifrontal LDLᵀ without pivoting, refined
+  Unsymmetric    ///< multifrontal LU with partial pivoting inside a front, refined
 };
 
 /// Which part of the reduced matrix a factor of this kind reads.
@@ -78,11 +81,23 @@ class Factor {
   FactorStatus factorise(const ConstVector& values);
 
   /// x = A⁻¹ rhs, refined with the values of the last factorise.
+  ///
+  /// Where refinement of a multifrontal factor ends neither at the tolerance (1e-12 at least) nor
+  /// at rounding, UMFPACK factorises the same values and the better answer is kept. With
+  /// `max_steps` = 0 the factor is taken as it is.
   /// @throws StateError unless the last factorise was ok; ShapeError on a wrong size.
   SolveReport solve(const ConstVector& rhs, MutableVector x, const Refinement& refinement = {});
 
+  /// x = A⁻¹ rhs as the factor gives it, neither refined nor measured: a preconditioner.
+  /// @throws StateError unless the last factorise was ok; ShapeError on a wrong size.
+  void apply_inverse(const ConstVector& rhs, MutableVector x);
+
+  /// Of LDLᵀ also after a fall-back; `growth` then says that they are doubtful.
   /// @throws StateError unless the kind is QuasiDefinite and the last factorise was ok.
   Inertia inertia() const;
+
+  /// The last factorise or solve had to fall back to UMFPACK.
+  bool fell_back() const;
 
   Kind kind() const;
   std::int64_t size() const;    ///< number of unknowns

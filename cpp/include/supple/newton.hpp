@@ -1,8 +1,9 @@
-/// Newton's method on R(u) = 0 with load steps, cut-back and back-tracking; never a silent failure.
+/// Newton's method on R(u) = 0 with load steps, back-tracking and arc length; never a silent
+/// failure.
 ///
-///     for each load step (the whole load first, halved where it fails):
-///         full Newton steps, guarded: J > 0 and ψ finite             quick, for the usual case
-///         else steps that decrease the energy, or the residual where there is none
+///     the whole load by full Newton steps, guarded: J > 0 and ψ finite   quick, the usual case
+///     else by steps that lower the energy, where equilibria are its minima
+///     else along the path of equilibria by arc length, past its folds (cpp/src/arc_length.hpp)
 ///
 /// From zero the load factor scales the loads and the prescribed displacements. From another start
 /// u0 the loads stay whole and R(u) − (1 − s) R(u0) = 0 is followed from s = 0, where u0 solves it.
@@ -16,16 +17,29 @@
 
 namespace supple {
 
+enum class Outcome {
+  Converged,
+  Unstable,   ///< an equilibrium with negative stiffness: a small push leaves it
+  Inverted,   ///< no step without an inverted cell
+  Singular,   ///< the tangent has no inverse
+  LimitPoint, ///< the load has a largest value on the path, below the whole, and did not come back
+  Stalled     ///< the residual does not fall any more
+};
+
+/// Whether an equilibrium (u, load factor) is of use; Converged if so, else what is wrong with it.
+using Judge = std::function<Outcome(const Vector&, double)>;
+
 struct NewtonSettings {
   double rtol = 1e-10;     ///< of max(‖external force‖, ‖reactions‖)
   double atol = 1e-14;     ///< N
   double step_tol = 1e-8;  ///< of `size`, on the largest entry of the Newton step
   double size = 1.0;       ///< of the body, m
   int max_iterations = 25; ///< of one load step; four times as many where each lowers the energy
-  int load_steps = 0;      ///< equal steps without cut-back; 0: adaptive from one
-  double smallest_step = 1.0 / 256.0; ///< of the load, below which an adaptive run gives up
-  bool refuse_inversion = true;       ///< J ≤ 0 at a point is refused (not for barrier laws)
-  bool warm = false;                  ///< follow from u0 as it is instead of scaling the loads
+  int load_steps = 0;      ///< equal steps without cut-back; 0: adaptive
+  bool refuse_inversion = true; ///< J ≤ 0 at a point is refused (not for barrier laws)
+  bool warm = false;            ///< follow from u0 as it is instead of scaling the loads
+  bool follow = false;          ///< the path at once, without trying the whole load first
+  Judge judge; ///< of the whole load's equilibrium and of those on the path; may be empty
 };
 
 /// One Newton iteration, or the start of a load step (iteration 0).
@@ -39,19 +53,11 @@ struct Iteration {
   double shift = 0.0;     ///< added to an indefinite tangent, relative to its diagonal
 };
 
-enum class Outcome {
-  Converged,
-  Unstable,   ///< an equilibrium with negative stiffness: a small push leaves it
-  Inverted,   ///< no step without an inverted cell
-  Singular,   ///< the tangent has no inverse
-  LimitPoint, ///< the tangent turned indefinite before the whole load was on
-  Stalled     ///< the residual does not fall any more
-};
-
 struct NewtonResult {
   Outcome outcome = Outcome::Converged;
   Vector u;                 ///< (dofs) at the last equilibrium found
-  double load_factor = 0.0; ///< of that equilibrium
+  double load_factor = 0.0; ///< of that equilibrium, the largest found
+  double fold = 0.0;        ///< load factor at the first limit point passed, 0 if there was none
   Vector residual;          ///< (dofs) at u with the whole load; reactions at fixed dofs
   std::vector<Iteration> history;
   VolumeRatio worst;         ///< smallest volume ratio met in the last attempt

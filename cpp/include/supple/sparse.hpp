@@ -128,6 +128,11 @@ struct Reduction {
 /// @throws ShapeError if `free` does not have one entry for each dof.
 Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage);
 
+/// Where the CSR values hold the transposed entry of each that `reduction`, of storage Lower,
+/// takes.
+/// @throws ShapeError if it stores the full matrix.
+std::vector<Index> mirror(const BlockPattern& pattern, const Reduction& reduction);
+
 /// Batches of cells in the order of their colours; batches of one colour share no node.
 struct Colouring {
   std::vector<Index> order;  ///< (batches) batch numbers; batch k is cells [k·batch, (k+1)·batch)

@@ -4,14 +4,16 @@
 #include <memory>
 #include <vector>
 
+#include "supple/inverse_solver.hpp"
 #include "supple/linear.hpp"
 #include "supple/term.hpp"
 
 namespace supple {
 
-/// Seconds spent in the phases of a solve.
+/// Seconds spent in the phases of a solve, and how often its costly parts were done.
 struct Timings {
   double assembly = 0.0, factor = 0.0, solve = 0.0, total = 0.0;
+  int factorisations = 0, krylov_iterations = 0;
 };
 
 class System {
@@ -26,6 +28,10 @@ class System {
   /// Which dofs are free; the reduction and the symbolic factor are made anew if it changes.
   /// @throws ShapeError on a wrong size.
   void set_free(Mask free);
+
+  /// Solve with unsymmetric tangents, which are those of an inverse form, by GMRES instead of LU;
+  /// to be called before each run, which starts from no factor of an earlier one.
+  void use_gmres(bool gmres);
 
   Index scalars() const { return static_cast<Index>(home_.size()); }
   Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
@@ -58,7 +64,9 @@ class System {
   /// The same without asking it to be positive definite (symmetric kinds only).
   FactorStatus factorise_indefinite();
   /// x (dofs), 0 at fixed ones, from the last factor; `rhs` (dofs).
-  Vector solve(const ConstVector& rhs);
+  /// @param tolerance of the residual over that of x = 0, which GMRES need not fall below.
+  /// x is not finite where GMRES and then LU found the tangent singular.
+  Vector solve(const ConstVector& rhs, double tolerance = 1e-10);
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
   /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only); of a
@@ -68,6 +76,11 @@ class System {
   Timings timings;
 
  private:
+  bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
+  FactorStatus prepare_inverse();
+  void count_work();
+  void forget_factors();
+
   std::shared_ptr<Vector> points_;
   std::vector<Index> home_;
   std::vector<std::shared_ptr<Term>> terms_;
@@ -76,7 +89,10 @@ class System {
   std::unique_ptr<Reduction> reduction_;
   std::unique_ptr<Factor> factor_, indefinite_;
   Factor* current_ = nullptr; // the one that factorised last
+  std::unique_ptr<InverseSolver> inverse_;
+  bool gmres_ = false;
   Vector values_, reduced_;
+  Vector at_; // u of values_
 };
 
 } // namespace supple

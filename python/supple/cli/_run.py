@@ -20,7 +20,8 @@ class Run:
     """One run of a command: where it writes, what it found, whether that can be trusted.
 
     Used as a context: on success the files appear in the output folder, with `result` beside them
-    as result.json, and the result is printed; on any exception nothing is left behind.
+    as result.json, and the result is printed; on any exception nothing is left behind but what the
+    command has chosen to `keep`.
 
     Attributes:
         result: what `--json` prints; commands fill it.
@@ -34,6 +35,7 @@ class Run:
         self._folder = None if out is None else OutputFolder(out)
         self._lines: list[str] = []
         self._doubts: list[str] = []
+        self._obsolete: tuple[str, ...] = ()
 
     def out_or(self, default: Path) -> None:
         """Write to `default` unless the user chose a folder with --out."""
@@ -59,6 +61,21 @@ class Run:
         """The result is written all the same, but marked, and the command exits with 3."""
         self._doubts.append(reason)
 
+    def replaces(self, names: tuple[str, ...]) -> None:
+        """A good end removes these files of an earlier run from the output folder."""
+        self._obsolete = names
+
+    def drop(self) -> None:
+        """Forget the files written so far."""
+        if self._folder is not None:
+            self._folder.discard()
+
+    def keep(self) -> None:
+        """The files written so far appear now, whatever comes: for what is left of a failure."""
+        assert self._folder is not None, "a command that writes files calls out_or first"
+        names = self._folder.publish()
+        click.echo(f"supple: where it ended: {self._folder.target}: {', '.join(names)}", err=True)
+
     @property
     def exit_code(self) -> int:
         """0, or 3 when there are doubts."""
@@ -83,6 +100,8 @@ class Run:
         if self._folder is not None:
             self.path("result.json").write_text(dumps(self.result) + "\n", encoding="utf-8")
             names = self._folder.publish()
+            for name in self._obsolete:
+                (self._folder.target / name).unlink(missing_ok=True)
             self.say(f"wrote {self._folder.target}: {', '.join(names)}")
         click.echo(dumps(self.result) if self._as_json else "\n".join(self._lines))
         for reason in self._doubts:

@@ -1,103 +1,187 @@
-"""`supple rest-shape`: the shape that a body has without its loads."""
+"""`supple rest-shape`: the shape that a body has without its loads.
+
+CASE or MESH ─► body ─► rest shape ─► rest.vtu, loaded.vtu ─► loaded again ─► result.json
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import InputError
+from ..choices import METHODS, SOLVERS, STATES
+from ..errors import ConvergenceError, InputError
 from ._run import Run, command
 
-METHODS = ("inverse", "reversed-gravity")
+if TYPE_CHECKING:
+    from ..state import Rest
+
+#: What may lie behind a rest shape that does not come back.
+_WHY = {
+    "another equilibrium": "it has several stable shapes under this load, and this is another one",
+    "unstable": "the given shape is an equilibrium that a push would leave",
+    "no equilibrium": "the given shape is no equilibrium of it",
+}
+_NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwise here
 
 
 @command
 @click.argument("loaded", metavar="CASE|MESH", type=click.Path(path_type=Path))
-@click.option("--method", type=click.Choice(METHODS), default="inverse", show_default=True,
-              help="reversed-gravity is approximate, to compare with.")  # fmt: skip
+@click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="inverse",
+    show_default=True,
+    help="reversed-gravity is approximate, to compare with: its check fails.",
+)
+@click.option(
+    "--density-of",
+    type=click.Choice(STATES),
+    default="rest",
+    show_default=True,
+    help="The state that the density counts in.",
+)
+@click.option(
+    "--directions-of",
+    type=click.Choice(STATES),
+    default="rest",
+    show_default=True,
+    help="The state in which the law's directions, such as fibres, lie as given.",
+)
+@click.option(
+    "--solver",
+    type=click.Choice(SOLVERS),
+    default="auto",
+    show_default=True,
+    help="Of the unsymmetric tangents: auto is gmres; direct is LU.",
+)
+@click.option(
+    "--check/--no-check",
+    default=True,
+    show_default=True,
+    help="Load the rest shape again and compare with what was given.",
+)
+@click.option("--check-overlap", is_flag=True, help="Refuse a rest shape that lies in itself.")
 @click.option("--allow-energy-files", is_flag=True, help="Compile energy files that CASE names.")
 @click.option("--unit", help="Of the coordinates in MESH: m, mm, cm, ….")
+@click.option("--element", help="Cells to keep of a MESH with several kinds: P1, Q1, ….")
 @click.option("--law", help="Name of an energy or path of an energy file; default neo_hookean.")
-@click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Parameter of the law.")
+@click.option(
+    "--set",
+    "values",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Parameter of the law: young=3e3 or fibre=1,0,0.",
+)
 @click.option("--density", type=float, help="kg/m³; default 1000.")
+@click.option("--formulation", help="displacement (default), mixed or mean-dilatation.")
+@click.option("--quadrature", type=int, help="Degree of the stiffness' rule.")
 @click.option("--gravity", nargs=3, type=float, help="x y z in m/s²; default 0 0 -9.81.")
-@click.option("--fix", "fixed", multiple=True, metavar="WHERE",
-              help="What is held: a tag, or a place such as z=max or z=0.1.")  # fmt: skip
+@click.option(
+    "--fix",
+    "fixed",
+    multiple=True,
+    metavar="WHERE",
+    help="What is held: a tag, or a place in m: z=max, z=0.1, x=0:0.1,y=min.",
+)
+@click.option("--load-steps", type=int, help="Equal load steps; adaptive unless given.")
+@click.option("--rtol", type=float, help="Residual over load; default 1e-10.")
+@click.option("--max-iterations", type=int, help="Of each load step; default 25.")
 def rest_shape(
-    run: Run, loaded: Path, method: str, allow_energy_files: bool, **mesh_options: Any
+    run: Run,
+    loaded: Path,
+    method: str,
+    density_of: str,
+    directions_of: str,
+    solver: str,
+    check: bool,
+    check_overlap: bool,
+    allow_energy_files: bool,
+    **mesh_options: Any,
 ) -> None:
-    """Find the shape without loads of a body that is given as loaded.
+    r"""Find the shape without loads of a body that is given as loaded.
 
     CASE is a TOML file as for `supple solve`, its mesh the loaded shape. For a MESH under gravity
-    alone, the options below --allow-energy-files say the rest. Writes rest.vtu and result.json to
-    --out (default: out/ and the name of the input).
-    """
-    from ..case import Table, read_case
-    from . import _report
+    alone, the options below --allow-energy-files say the rest. Writes to --out (default: out/ and
+    the name of the input)
+
+    \b
+      rest.vtu     the rest shape with its tags
+      loaded.vtu   the given shape and what it carries, where a later simulation starts: per cell
+                   F, J and the Cauchy stress, per node the displacement to the rest shape
+      result.json  numbers, with the check: loaded again, the rest shape must be the given one to
+                   a millionth of its size (else exit 3)
+
+    Where there is no rest shape it exits with 3 and writes failure.json, failure.vtu and
+    failure.png instead: the last equilibrium on the way, with the worst cells marked.
+    """  # fmt: skip
+    from . import _failure, _report
     from ._body_case import read_body
 
     run.out_or(Path("out") / loaded.stem)
     run.progress("reading")
-    if loaded.suffix == ".toml":
-        _refuse_options(mesh_options)
-        case = read_case(loaded)
-    else:
-        case, allow_energy_files = Table(_case_of_mesh(loaded, **mesh_options), loaded), True
-    body, settings = read_body(case, allow_energy_files=allow_energy_files)
+    case, allowed = _case(loaded, mesh_options, allow_energy_files)
+    body, settings = read_body(case, allow_energy_files=allowed)
     run.progress("compiling")
-    watch = _report.progress(run, "rest shape")
-    rest = body.rest_shape(method=method, progress=watch, **settings)
-    run.result |= {"method": method, "approximate": method != "inverse"}
-    _report.equilibrium(run, rest, body.mesh, "rest.vtu")
-
-
-def _refuse_options(given: dict[str, Any]) -> None:
-    names = {"values": "set", "fixed": "fix"}
-    for name, value in given.items():
-        if value not in (None, ()):
-            raise InputError(f"--{names.get(name, name)} goes with a MESH; a CASE says it itself.")
-
-
-def _case_of_mesh(
-    mesh: Path,
-    unit: str | None,
-    law: str | None,
-    values: tuple[str, ...],
-    density: float | None,
-    gravity: tuple[float, ...] | None,
-    fixed: tuple[str, ...],
-) -> dict[str, Any]:
-    """The case that the options describe, as its TOML would be read."""
-    source = {"file": mesh.name} if unit is None else {"file": mesh.name, "unit": unit}
-    name = law or "neo_hookean"
-    law_path = str(Path(name).absolute()) if name.endswith(".py") else name
-    material = {"law": law_path, "density": 1000.0 if density is None else density}
-    return {
-        "mesh": source,
-        "material": material | dict(_parameter(text) for text in values),
-        "fix": [{"where": _place(text)} for text in fixed],
-        "gravity": {"acceleration": list(gravity or (0.0, 0.0, -9.81))},
+    asked: dict[str, Any] = {
+        "method": method,
+        "density_of": density_of,
+        "directions_of": directions_of,
+        "solver": solver,
+        "check_overlap": check_overlap,
     }
-
-
-def _parameter(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    number = _number(value)
-    if not name or not isinstance(number, float):
-        raise InputError(f"--set must be NAME=VALUE, such as young=3e3, got {text!r}.")
-    return name, number
-
-
-def _place(text: str) -> Any:
-    """A tag, or {axis: "min", "max" or coordinate} of "axis=..."."""
-    axis, equals, value = text.partition("=")
-    return {axis: _number(value)} if equals else text
-
-
-def _number(text: str) -> float | str:
+    watch = _report.progress(run, "rest shape")
     try:
-        return float(text)
-    except ValueError:
-        return text
+        rest = body.rest_shape(progress=watch, **asked, **settings)
+    except ConvergenceError as error:
+        _failure.leave(run, error, body.mesh)
+        raise
+    run.replaces(_failure.FILES)
+    run.result |= asked | {"approximate": method == "reversed-gravity", "size_m": body.mesh.size}
+    _report.equilibrium(run, rest, body.mesh, "rest.vtu")
+    rest.write_loaded(run.path("loaded.vtu"))
+    if check:
+        _check(run, rest, settings)
+
+
+def _case(loaded: Path, mesh_options: dict[str, Any], allow_energy_files: bool) -> tuple[Any, bool]:
+    """The case of a TOML file, or of a mesh file and the options, and whether it may name files."""
+    from ..case import read_case
+    from ._options_case import case_of
+
+    if loaded.suffix != ".toml":
+        return case_of(loaded, mesh_options), True
+    for name, value in mesh_options.items():
+        if value not in (None, ()):
+            option = _NAMES.get(name, name).replace("_", "-")
+            raise InputError(f"--{option} goes with a MESH; a CASE says it itself.")
+    return read_case(loaded), allow_energy_files
+
+
+def _check(run: Run, rest: Rest, settings: dict[str, Any]) -> None:
+    """Load the rest shape again; what is farther off than `CLOSES` makes the result doubtful."""
+    from ..rest_check import round_trip
+    from . import _report
+
+    watch = _report.progress(run, "loading again")
+    try:
+        found = round_trip(rest, progress=watch, **settings)
+    except ConvergenceError as error:
+        run.result["check"] = {"passed": False, "cause": error.cause}
+        run.doubt(f"loaded again, the rest shape does not come back: {error}")
+        return
+    run.result["check"] = {
+        "passed": found.given == "reached",
+        "given_shape": found.given,
+        "largest_distance_m": found.distance,
+        "relative_distance": found.relative,
+        "iterations": found.state.iterations,
+        "seconds": found.seconds,
+    }
+    misses = f"{1e3 * found.distance:.3g} mm, {found.relative:.2g} of its size"
+    run.say(f"loaded again it misses the given shape by {misses} ({found.seconds:.2g} s)")
+    if found.given != "reached":
+        run.doubt(
+            f"loaded again, the rest shape misses the given one by {misses}: {_WHY[found.given]}"
+        )

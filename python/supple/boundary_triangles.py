@@ -1,0 +1,35 @@
+"""Facets of any element as flat triangles between their nodes, to look at and to intersect."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from supple.kernels.cells import Element
+from supple.mesh_topology import by_kind
+
+Ints = npt.NDArray[np.int64]
+
+#: Triangles (t, 3) of each kind of facet; nodes in VTK order: corners, middles of edges, middle.
+_SPLITS = {
+    "T1": ((0, 1, 2),),
+    "T2": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    "S1": ((0, 1, 2), (0, 2, 3)),
+    "S2": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7)),
+    "S2L": tuple((*side, 8) for side in
+                 ((0, 4), (4, 1), (1, 5), (5, 2), (2, 6), (6, 3), (3, 7), (7, 0))),
+}  # fmt: skip
+
+
+def triangles_of(facets: Ints, element: Element) -> tuple[Ints, Ints]:
+    """Triangles (t, 3) node ids, turned as their facets are, and the row (t,) of each one's facet.
+
+    A curved facet becomes as many flat triangles as its nodes span, so that a closed surface stays
+    closed.
+    """
+    triangles, rows = [], []
+    for kind, own in by_kind(facets, element):
+        split = np.array(_SPLITS[kind.name])
+        triangles.append(facets[own][:, split].reshape(-1, 3))
+        rows.append(np.repeat(own, len(split)))
+    return np.concatenate(triangles), np.concatenate(rows)

@@ -1,0 +1,127 @@
+"""The rest shape of a loaded body: what was asked for, found by its method, and looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import directions, failures, fixed_point, overlap, terms
+from .choices import FIXED_POINTS, METHODS, SOLVERS, STATES
+from .core import core
+from .errors import InputError
+from .mesh_jacobian import smallest_jacobian
+from .newton import Settings
+from .state import Rest, outcome
+
+if TYPE_CHECKING:
+    from .body import Body
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked for; `Body.rest_shape` says what the names mean.
+
+    Raises:
+        InputError: a choice that there is not, or an option that the method does not take.
+    """
+
+    method: str
+    density_of: str
+    directions_of: str
+    solver: str
+    check_overlap: bool
+    settings: Settings
+    options: dict[str, Any] = field(default_factory=dict)  # of a fixed point
+
+    def __post_init__(self) -> None:
+        _require_one("method", self.method, METHODS)
+        _require_one("density_of", self.density_of, STATES)
+        _require_one("directions_of", self.directions_of, STATES)
+        _require_one("solver", self.solver, SOLVERS)
+        fixed_point.options(self.options, self.method)
+
+
+def find(body: Body, asked: Request, start: Rest | None) -> Rest:
+    """The rest shape of ``body``.
+
+    Raises:
+        InputError: ``start`` is no rest shape of this mesh.
+        ConvergenceError: there is none, or none was found.
+    """
+    if start is not None and not isinstance(start, Rest):
+        raise InputError(f"start must be a rest shape, got {type(start).__name__}.")
+    if asked.directions_of == "rest" or not directions.has_any(body):
+        rest = _find(body, asked, start)
+    else:
+        mirrored = asked.method == "reversed-gravity"
+        rest = directions.rest_of_loaded(body, start, lambda b, s: _find(b, asked, s), mirrored)
+    if asked.check_overlap:
+        overlap.require_apart(rest.mesh)
+    return rest
+
+
+def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
+    """With the body's directions those at rest."""
+    if asked.method in FIXED_POINTS:
+        chosen = fixed_point.options(asked.options, asked.method)
+        rest = fixed_point.rest_shape(
+            body, asked.method, asked.settings, chosen, asked.density_of, start
+        )
+    else:
+        rest = _solved(body, asked, start)
+    failures.require_usable(rest)
+    return rest
+
+
+def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
+    """By one solve: of the inverse form, or with the loads reversed."""
+    begin = None if start is None else body._start(start)
+    if asked.method == "inverse":
+        gmres = asked.solver != "direct"
+        result, built = body._run(asked.settings, begin, True, asked.density_of, gmres, Judge(body))
+    else:
+        result, built = body._reversed()._run(asked.settings, begin)
+    failures.require_converged(result, built, body._description, inverse=True)
+    return Rest(
+        **outcome(result, built, body._description, body._fixed),
+        _solved=terms.snapshot(body._description),
+        _form="inverse",
+        method=asked.method,
+        density_of=asked.density_of,
+        _body=body._weighed_in(asked.density_of),
+    )
+
+
+class Judge:
+    """Whether a body, loaded, would rest on the rest shapes that are found for it.
+
+    One that any push leaves cannot have been seen in the given shape. Loads without an energy, such
+    as a pressure that follows, hide it.
+
+    Args:
+        body: on the given shape.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self._body = body.on(body.mesh)
+
+    def __call__(self, found: Floats, _load_factor: float) -> Any:
+        """Converged, inverted or unstable, of the unknowns ``found`` of the inverse form."""
+        outcome, mesh = core().Outcome, self._body.mesh
+        points = mesh.points + found[: mesh.points.size].reshape(-1, 3)
+        if (smallest_jacobian(points, mesh.cells, mesh.table) <= 0).any():
+            return outcome.inverted
+        self._body._system().system.move_points(points.ravel())
+        loaded = found.copy()
+        loaded[: mesh.points.size] *= -1
+        return outcome.unstable if self._body._unstable_directions(loaded) else outcome.converged
+
+
+def _require_one(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise InputError(f"{name} must be one of {choices}, got {value!r}.")

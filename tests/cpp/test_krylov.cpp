@@ -1,0 +1,132 @@
+#include "supple/krylov.hpp"
+
+#include <cmath>
+
+#include "check.hpp"
+#include "fixtures.hpp"
+#include "supple/error.hpp"
+
+using namespace supple;
+
+namespace {
+
+/// Unsymmetric and well conditioned: the identity plus a random part of norm below 1.
+Eigen::MatrixXd random_matrix(int n, double size, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  const Eigen::MatrixXd part =
+      Eigen::MatrixXd::NullaryExpr(n, n, [&] { return normal(random) / std::sqrt(n); });
+  return Eigen::MatrixXd::Identity(n, n) + size * part;
+}
+
+Operator product(const Eigen::MatrixXd& matrix) {
+  return [&matrix](const Vector& x, Vector& y) { y = matrix * x; };
+}
+
+void identity(const Vector& x, Vector& y) {
+  y = x;
+}
+
+} // namespace
+
+/// Against Eigen's LU with complete pivoting, with and without a preconditioner.
+TEST(gmres_solution_equals_dense_solution) {
+  const Eigen::MatrixXd a = random_matrix(60, 0.3, 1), m = random_matrix(60, 0.2, 2).inverse();
+  const Vector b = Vector::LinSpaced(60, -1.0, 2.0), expected = a.fullPivLu().solve(b);
+  for (const bool preconditioned : {false, true}) {
+    Vector x = Vector::Zero(60);
+    const Operator other = preconditioned ? product(m) : Operator(identity);
+    const GmresReport report = gmres(product(a), other, b, x, {1e-13, 60});
+    CHECK(report.converged);
+    CHECK_BELOW((x - expected).norm(), 1e-11 * expected.norm());
+  }
+}
+
+/// The residual is the one of A x = b, not of the preconditioned system, whatever its scale.
+TEST(reported_residual_is_that_of_the_system) {
+  const Eigen::MatrixXd a = random_matrix(40, 0.5, 3);
+  const Eigen::MatrixXd m = 1e-6 * random_matrix(40, 0.3, 4);
+  const Vector b = Vector::LinSpaced(40, 1.0, 3.0);
+  for (const double tolerance : {1e-1, 1e-3, 1e-6}) {
+    Vector x = Vector::Zero(40);
+    const GmresReport report = gmres(product(a), product(m), b, x, {tolerance, 40});
+    CHECK_BELOW(report.residual, tolerance);
+    CHECK_BELOW(std::abs((b - a * x).norm() / b.norm() - report.residual), 1e-12);
+  }
+}
+
+/// Saad (2003), proposition 6.10: the inverse itself ends it in one iteration, and no
+/// preconditioner in as many as there are distinct eigenvalues.
+TEST(iterations_are_the_degree_of_the_minimal_polynomial) {
+  const Eigen::MatrixXd a = random_matrix(30, 0.4, 5), inverse = a.inverse();
+  const Vector b = Vector::Ones(30);
+  Vector x = Vector::Zero(30);
+  CHECK(gmres(product(a), product(inverse), b, x, {1e-10, 30}).iterations == 1);
+  Vector three(30);
+  for (int i = 0; i < 30; ++i)
+    three[i] = 1.0 + i % 3;
+  const Eigen::MatrixXd diagonal = three.asDiagonal();
+  x.setZero();
+  CHECK(gmres(product(diagonal), identity, b, x, {1e-10, 30}).iterations == 3);
+}
+
+TEST(a_good_guess_leaves_less_to_do) {
+  const Eigen::MatrixXd a = random_matrix(50, 0.4, 6);
+  const Vector b = Vector::Ones(50);
+  Vector x = Vector::Zero(50), half = x;
+  const GmresReport whole = gmres(product(a), identity, b, x, {1e-10, 50});
+  gmres(product(a), identity, b, half, {1e-5, 50});
+  const GmresReport rest = gmres(product(a), identity, b, half, {1e-10, 50});
+  CHECK(rest.converged && rest.iterations < whole.iterations);
+  CHECK(gmres(product(a), identity, b, half, {1e-9, 50}).iterations == 0);
+  CHECK_BELOW((half - x).norm(), 1e-8 * x.norm());
+}
+
+/// The cyclic shift: no iteration but the last lowers the residual (Saad 2003, example 6.2).
+TEST(stagnation_is_noticed_long_before_the_limit) {
+  const int n = 200;
+  const Operator shift = [](const Vector& x, Vector& y) {
+    y.resize(x.size());
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      y[(i + 1) % x.size()] = x[i];
+  };
+  Vector x = Vector::Zero(n);
+  const GmresReport report = gmres(shift, identity, Vector::Unit(n, 0), x, {1e-8, n});
+  CHECK(!report.converged && report.iterations < 20);
+  CHECK_BELOW(std::abs(report.residual - 1.0), 1e-12);
+}
+
+TEST(singular_matrix_and_no_numbers_do_not_converge) {
+  Eigen::MatrixXd a = Eigen::MatrixXd::Identity(10, 10);
+  a(9, 9) = 0.0;
+  Vector x = Vector::Zero(10);
+  CHECK(!gmres(product(a), identity, Vector::Ones(10), x, {1e-8, 10}).converged);
+  CHECK(x.allFinite());
+  a(0, 0) = std::nan("");
+  CHECK(!gmres(product(a), identity, Vector::Ones(10), x, {1e-8, 10}).converged);
+}
+
+TEST(zero_right_hand_side_gives_zero) {
+  const Eigen::MatrixXd a = random_matrix(5, 0.1, 7);
+  Vector x = Vector::Ones(5);
+  CHECK(gmres(product(a), identity, Vector::Zero(5), x, {}).converged && x.isZero(0.0));
+  CHECK_THROWS(gmres(product(a), identity, Vector::Ones(4), x, {}), ShapeError);
+}
+
+/// A quadratic Newton sequence keeps its order: η falls as the square of the residual's ratio.
+TEST(forcing_follows_quadratic_convergence) {
+  Forcing forcing(1e-2);
+  const double first = forcing.next(1.0, 1e-12), second = forcing.next(1e-2, 1e-12);
+  CHECK(first == 1e-2);
+  CHECK_BELOW(std::abs(second - 0.9e-4), 1e-12);
+  const double third = forcing.next(1e-6, 1e-12); // no more than what is left to do
+  CHECK_BELOW(std::abs(third - 0.5e-6), 1e-12);
+}
+
+TEST(forcing_is_never_looser_than_its_limit) {
+  Forcing forcing(1e-3);
+  for (const double norm : {1.0, 50.0, 2e4, 1e4, 1e-9}) {
+    const double eta = forcing.next(norm, 1e-8);
+    CHECK(eta > 0.0 && eta <= 1e-3);
+  }
+}
