@@ -76,3 +76,8 @@ def test_results_come_once_each_whoever_ends_first() -> None:
 def test_what_a_worker_raises_reaches_the_caller() -> None:
     with pytest.raises(ZeroDivisionError):
         list(workers.results(divmod, [(1, 0)], jobs=1))
+
+
+def test_a_worker_that_dies_is_an_error_in_words() -> None:
+    with pytest.raises(supple.SuppleError, match="worker process was ended"):
+        list(workers.results(os._exit, [(1,)], jobs=1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import click
 
@@ -20,13 +21,21 @@ def sagging_block(
     convergence: bool = False,
 ) -> None:
     """The study of that name."""
+    from ..studies.sagging_block_samples import TABLE
+
     if convergence:
         _convergence(run)
-    else:
-        _samples(run, samples, seed, jobs, resume)
+        return
+    table = run.target / TABLE
+    try:
+        _samples(run, table, samples, seed, jobs, resume)
+    except KeyboardInterrupt:
+        if not table.exists():
+            raise
+        raise click.Abort(f"interrupted; {table} keeps its samples, --resume goes on") from None
 
 
-def _samples(run: Run, samples: int, seed: int, jobs: int, resume: bool) -> None:
+def _samples(run: Run, table: Path, samples: int, seed: int, jobs: int, resume: bool) -> None:
     from ..studies import sagging_block as block
     from ..studies import sagging_block_figure as figure
     from ..studies import sagging_block_samples as many
@@ -39,13 +48,9 @@ def _samples(run: Run, samples: int, seed: int, jobs: int, resume: bool) -> None
         )
     begin, jobs = time.monotonic(), jobs or workers.available()
     reference = block.Block()  # compiles, where that is still to be done, before the workers ask
-    table = run.target / many.TABLE
-    try:
-        journal, seconds = many.run(
-            table, samples, seed, jobs, resume, lambda share: run.progress("sagging-block", share)
-        )
-    except KeyboardInterrupt:
-        raise click.Abort(f"interrupted; {table} keeps its samples, --resume goes on") from None
+    journal, seconds = many.run(
+        table, samples, seed, jobs, resume, lambda share: run.progress("sagging-block", share)
+    )
     printed = {at: reference.run(*at).mae for at in block.PRINTED}
     run.path(many.TABLE).write_text(journal.table(), encoding="utf-8")
     for suffix in ("svg", "png"):

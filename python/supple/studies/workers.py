@@ -7,9 +7,12 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
 from typing import Any
+
+from ..errors import SuppleError
 
 
 def available() -> int:
@@ -32,7 +35,7 @@ def results(
         jobs: processes; each calls ``start`` first.
 
     Raises:
-        BrokenProcessPool: a process was killed. And whatever ``work`` raises.
+        SuppleError: a process was killed. And whatever ``work`` raises.
     """
     if not tasks:
         return
@@ -44,6 +47,11 @@ def results(
             futures += [pool.submit(work, *task) for task in tasks[jobs:]]
             for future in as_completed(futures):
                 yield future.result()
+        except BrokenProcessPool:
+            raise SuppleError(
+                "a worker process was ended from outside, for lack of memory perhaps; "
+                "try fewer --jobs, and --resume where the study has it."
+            ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
