@@ -2,9 +2,9 @@
 
     round bars (and a mesh given) → hang → tip beside the elastica → rest shape → how straight
 
-Mazier et al. (2022), Engineering with Computers 38, and thesis §3: Mooney–Rivlin in u and p, clamped
-at x = 0, gravity along -y. The volumetric energy there is D (J - 1)², here bulk/2 ln²J with
-bulk = 2 D: at 3000 times the shear modulus no digit tells them apart.
+Mazier et al. (2022), Engineering with Computers 38, and thesis §3: Mooney–Rivlin in u and p,
+clamped at x = 0, gravity along -y. The volumetric energy there is D (J - 1)², here bulk/2 ln²J
+with bulk = 2 D; at 3000 times the shear modulus they part by less than 1e-11 m.
 """
 
 from __future__ import annotations
@@ -124,9 +124,7 @@ def cantilever(
 def silicone(mesh: Mesh, formulation: str, density: float = DENSITY, bulk: float = BULK,
              quadrature: int | None = None) -> Body:  # fmt: skip
     """The beam, clamped at x = 0, under its weight."""
-    body = Body(
-        mesh, "mooney_rivlin", formulation, density, quadrature, c1=C1, c2=C2, bulk=bulk
-    )
+    body = Body(mesh, "mooney_rivlin", formulation, density, quadrature, c1=C1, c2=C2, bulk=bulk)
     return body.fix(root).gravity((0.0, -GRAVITY, 0.0))
 
 
