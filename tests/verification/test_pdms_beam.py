@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from supple import Mesh
+from supple import InputError, Mesh
+from supple.cli import main
 from supple.studies import pdms_beam as pdms
 from supple.studies.elastica import bend
 from supple.studies.pdms_beam_report import ROUND_BAR, STRAIGHT_BAR, checks, lines, table
@@ -85,6 +86,15 @@ def test_the_mesh_of_the_thesis_has_the_sections_that_were_measured(beam2k):
     assert cut.area.mean() / pdms.AREA == pytest.approx(0.944, abs=1e-3)
     assert cut.moment.mean() / pdms.MOMENT == pytest.approx(0.882, abs=1e-3)
     assert cut.area.mean() * pdms.LENGTH == pytest.approx(beam2k.volume, rel=1e-3)
+
+
+def test_another_mesh_or_study_is_refused(tmp_path):
+    """A box of 1 m is no beam of 182 mm; --mesh is an option of this study alone (exit 2)."""
+    with pytest.raises(InputError, match=r"0\.182 m"):
+        pdms.given(Mesh.box((1, 1, 1), (1.0, 1.0, 1.0)))
+    out = str(tmp_path / "out")
+    assert main(["study", "hanging-dome", "--mesh", "beam.msh", "--out", out]) == 2
+    assert main(["study", "pdms-beam", "--mesh", "none.msh", "--out", out]) == 2
 
 
 @pytest.mark.slow
