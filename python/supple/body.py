@@ -371,7 +371,9 @@ class Body:
         return newton.solve(built.system, start, target, native, settings, judge), built
 
     def _unstable_directions(self, u: Floats) -> int:
-        """In which the body buckles at unknowns ``u``; 0 where loads without energy hide it."""
+        """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
+        if self._description.pressures:  # which have none: nothing needs to be built
+            return 0
         system = self._system().system
         if not system.has_energy():
             return 0

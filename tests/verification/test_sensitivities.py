@@ -48,7 +48,7 @@ class Case:
         self.p = 100 * np.cos(3 * self.mesh.points[:, 0]) if mixed else None
         zero = np.zeros_like(self.u)
         solved = (self.u, 0, [], {}, 0.0, zero, (), self.body._description, "", self.p)
-        self.at = (Rest if inverse else State)(*solved)
+        self.at = Rest(*solved, _body=self.body) if inverse else State(*solved)
 
     def residual(self, body):
         flat, built = unknowns(body, self.u, self.p), body._system(self.inverse)
