@@ -17,11 +17,13 @@ import numpy.typing as npt
 from .boundary_triangles import triangles_of
 from .box_pairs import meeting
 from .errors import ConvergenceError
+from .kernels.cells import NO_NODE
 from .mesh_checks import some
-from .mesh_topology import facet_uses
+from .mesh_topology import all_facets, corner_groups, facet_corners, facet_uses
 
 if TYPE_CHECKING:
     from .mesh import Mesh
+    from .state import Rest
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -58,23 +60,50 @@ def owners(mesh: Mesh) -> Ints:
     return np.asarray(np.flatnonzero(uses == 1) // len(mesh.table.facets))
 
 
-def require_apart(mesh: Mesh, what: str = "rest shape") -> None:
-    """Refuse a mesh that overlaps itself.
+def turned_over(mesh: Mesh) -> Ints:
+    """Cells (k,) that lie on the same side as their neighbour of half of the facets they share.
+
+    Each of them is positive by itself, and in its neighbours: a cell that was inside out and had
+    its nodes reordered to look right. The whole mesh may then be overlapping there.
+    """
+    facets = all_facets(mesh.cells, mesh.table)
+    corners = facet_corners(facets, mesh.table)
+    (group,) = corner_groups(corners)
+    shared = (np.bincount(group) == 2)[group]
+    alike = shared & (np.bincount(group, _turns(corners))[group] != 1)
+    per_cell = (x.reshape(len(mesh.cells), -1).sum(axis=1) for x in (alike, shared))
+    wrong, neighbours = per_cell
+    return np.flatnonzero((wrong > 0) & (2 * wrong >= neighbours))
+
+
+def _turns(corners: Ints) -> Mask:
+    """Which way (f,) loops (f, most corners) run from their least node."""
+    count, rows = (corners != NO_NODE).sum(axis=1), np.arange(len(corners))
+    least = np.where(corners == NO_NODE, corners.max() + 1, corners).argmin(axis=1)
+    after, before = (corners[rows, (least + step) % count] for step in (1, -1))
+    return np.asarray(after < before)
+
+
+def require_apart(rest: Rest) -> None:
+    """Refuse a rest shape that overlaps itself where the shape that was given does not.
 
     Raises:
         ConvergenceError: how many facets, of which cells.
     """
-    rows = overlapping(mesh)
+    rows = overlapping(rest.mesh)
+    if len(rows):  # a mesh with cells turned over has been given so: that is not the rest shape's
+        rows = np.setdiff1d(rows, overlapping(rest.loaded))
     if not len(rows):
         return
-    cells, cause = np.unique(owners(mesh)[rows]), f"{what} overlaps itself"
+    cells, cause = np.unique(owners(rest.mesh)[rows]), "rest shape overlaps itself"
     raise ConvergenceError(
         f"no usable rest shape: the {cause} at {len(rows)} boundary facets of cells {some(cells)}; "
         "try a smaller load, a stiffer material or a skin, or leave check_overlap out.",
+        history=rest.history,
         cells=cells.tolist(),
         load_factor=1.0,
         cause=cause,
-        points=mesh.points,
+        points=rest.points,
     )
 
 

@@ -61,7 +61,7 @@ def find(body: Body, asked: Request, start: Rest | None) -> Rest:
         mirrored = asked.method == "reversed-gravity"
         rest = directions.rest_of_loaded(body, start, lambda b, s: _find(b, asked, s), mirrored)
     if asked.check_overlap:
-        overlap.require_apart(rest.mesh)
+        overlap.require_apart(rest)
     return rest
 
 

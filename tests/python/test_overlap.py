@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -111,3 +113,38 @@ def test_a_rest_shape_that_overlaps_itself_is_refused_where_asked():
     np.testing.assert_allclose(caught.value.points, rest.points, atol=1e-12)
     assert set(caught.value.cells) <= set(range(len(rest.cells)))
     assert len(caught.value.cells)
+
+
+def test_a_given_shape_that_overlaps_is_not_held_against_its_rest_shape():
+    """Two boxes in each other stay as they are: both shapes overlap at the same facets."""
+    mesh = pair((0.9, 0.0, 0.0))
+    body = supple.Body(mesh, "neo_hookean", young=1e3, poisson=0.3)
+    body.prescribe(np.arange(len(mesh.points)), (0.0, 0.0, 0.0))
+    assert len(overlap.overlapping(body.rest_shape(check_overlap=True).mesh))
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_no_cell_of_a_sound_mesh_is_turned_over(element):
+    assert not len(overlap.turned_over(supple.Mesh.box((2, 3, 2), (1.0, 1.0, 1.0), element)))
+
+
+def test_a_cell_on_its_neighbours_side_is_named():
+    """A block's first cell mirrored in the block's own face, its nodes reordered to be positive.
+
+    It leaves three facets of its neighbours open and shares one, from the same side; so does that
+    neighbour, which shares others too.
+    """
+    mesh = supple.Mesh.box((2, 2, 2), (1.0, 1.0, 1.0))
+    uses = [np.isin(mesh.cells, face).sum(axis=1) == 3 for face in itertools.combinations(
+        mesh.cells[0], 3)]  # fmt: skip
+    inner = next(k for k, mask in enumerate(uses) if mask.sum() == 2)
+    face = np.array(list(itertools.combinations(mesh.cells[0], 3))[inner])
+    (apex,) = np.setdiff1d(mesh.cells[0], face)
+    a, b, c = mesh.points[face]
+    normal = np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a))
+    away = (mesh.points[apex] - a) @ normal
+    points = np.vstack([mesh.points, mesh.points[apex] - 1.9 * away * normal])
+    cell = [*face, len(mesh.points)] if away < 0 else [*face[::-1], len(mesh.points)]
+    turned = supple.Mesh(points, np.vstack([[cell], mesh.cells[1:]]), "P1")
+    assert 0 in overlap.turned_over(turned)
+    assert len(overlap.overlapping(turned))

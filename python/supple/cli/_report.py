@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import ConvergenceError, MeshError
+from ..mesh_checks import some
 from ._run import Run
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def equilibrium(run: Run, found: Equilibrium, mesh: Mesh, file: str) -> None:
             f"the shape found is not to be used: {error}", cause=cause
         ) from error
     ratio, stress = found.volume_ratio(), found.von_mises()
-    distance = np.linalg.norm(found.u, axis=1)
+    distance, warnings = np.linalg.norm(found.u, axis=1), [*found.warnings, *_doubtful_cells(mesh)]
     run.result |= {
         "unit": "m",
         "frame": "LPS",
@@ -48,8 +49,11 @@ def equilibrium(run: Run, found: Equilibrium, mesh: Mesh, file: str) -> None:
         "energy_j": found.energy,
         "iterations": found.iterations,
         "seconds": found.timings,
+        "warnings": warnings,
         "versions": {"supple": __version__},
     }
+    for warning in warnings:
+        run.say(f"warning: {warning}")
     run.say(
         f"largest displacement {1e3 * distance.max():.4g} mm, smallest volume ratio "
         f"{ratio.min():.3g}, largest von Mises stress {stress.max():.4g} Pa, "
@@ -58,3 +62,16 @@ def equilibrium(run: Run, found: Equilibrium, mesh: Mesh, file: str) -> None:
     if ratio.min() <= 0:
         cell = int(ratio.argmin())
         run.doubt(f"cell {cell} is turned inside out (volume ratio {ratio.min():.3g})")
+
+
+def _doubtful_cells(mesh: Mesh) -> list[str]:
+    """A warning if cells of the given mesh lie in each other."""
+    from ..overlap import turned_over
+
+    cells = turned_over(mesh)
+    if not len(cells):
+        return []
+    return [
+        f"cells {some(cells)} lie on the same side of a facet as their neighbours, so the mesh "
+        "overlaps itself there; mesh again."
+    ]
