@@ -33,6 +33,7 @@ test-cpp: .venv/.built ## the C++ tests, optimised and under the address and beh
 
 bench: .venv/.built .venv/.dev ## the benchmarks
 	$(BIN)/python benchmarks/run.py
+	$(BIN)/python benchmarks/rest_shape.py
 
 lint: .venv/.dev ## style and types, nothing is changed
 	$(BIN)/ruff check .

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace supple {
 
@@ -15,8 +16,8 @@ constexpr double kFar = 0.1;       // of a step: a correction after which the ta
 constexpr double kFoldTol = 2e-4;  // of the load, on the largest
 constexpr double kCollapse = 1e-2; // volume ratio of a cell that is taken for collapsed
 constexpr int kMostFactors = 300;  // before a fold
-constexpr int kAfterFold = 8;      // at least, to see whether the path comes back
-constexpr int kReturns = 3;        // to where a fault begins: an eighth of the step
+constexpr int kAfterFold = 6;      // at least, to see whether the path comes back
+constexpr int kReturns = 2;        // to where a fault begins: a quarter of the step
 constexpr double kNear = 0.05;     // of the load, to the whole of it where that has a fault
 
 /// Place in (0, 1) of the maximum of the cubic with values a, b and slopes p > 0 > q at 0 and 1.
@@ -43,13 +44,13 @@ Outcome ArcLength::run() {
   if (!corrector_.begin(here_)) return Outcome::Singular;
   length_ = kFirst / here_.ds;
   Outcome outcome = Outcome::Converged;
-  while (corrector_.factors() < budget()) {
-    if (fault_ != Outcome::Converged && fault_ == at_end_) break; // and so it is at the end
-    const bool last = here_.ds > 0.0 && here_.s + length_ * here_.ds >= 1.0;
-    if (last && at_end_ == Outcome::Converged && finish(outcome)) return outcome;
+  while (fault_ == Outcome::Converged && corrector_.factors() < budget()) {
+    const double whole = length_to_whole();
+    const bool last = whole <= length_;
+    if (last && at_end_ == Outcome::Converged && finish(whole, outcome)) return outcome;
     if (last && at_end_ != Outcome::Converged && 1.0 - here_.s < kNear) return at_end_;
     if (last || !advance()) {
-      length_ = 0.5 * (last ? std::min(length_, (1.0 - here_.s) / here_.ds) : length_);
+      length_ = 0.5 * std::min(length_, whole);
       refused_ = true;
     }
     if (length_ < kSmallest * std::max(travelled_, kFirst)) break;
@@ -58,10 +59,8 @@ Outcome ArcLength::run() {
 }
 
 int ArcLength::budget() const {
-  int most = kMostFactors;
-  for (const int first : {factors_at_fold_, factors_at_fault_})
-    if (first >= 0) most = std::min(most, first + std::max(kAfterFold, first / 2));
-  return most;
+  if (factors_at_fold_ < 0) return kMostFactors;
+  return factors_at_fold_ + std::max(kAfterFold, factors_at_fold_ / 2);
 }
 
 Outcome ArcLength::end() const {
@@ -70,9 +69,16 @@ Outcome ArcLength::end() const {
   return p_.result.worst.value < kCollapse ? Outcome::Inverted : Outcome::Stalled;
 }
 
-/// The whole load from where the tangent meets it.
-bool ArcLength::finish(Outcome& outcome) {
-  Vector u = predict((1.0 - here_.s) / here_.ds).u;
+/// Where the predicted path meets the whole load; infinite where it turns back before.
+double ArcLength::length_to_whole() const {
+  const double missing = 1.0 - here_.s, bend = predict(1.0).s - here_.s - here_.ds;
+  const double inside = here_.ds * here_.ds + 4.0 * bend * missing;
+  const double length = 2.0 * missing / (here_.ds + std::sqrt(inside)); // NaN: no such root
+  return length > 0.0 ? length : std::numeric_limits<double>::infinity();
+}
+
+bool ArcLength::finish(double length, Outcome& outcome) {
+  Vector u = predict(length).u;
   if (!p_.admissible(u, 1.0)) return false;
   outcome = step_.iterate(u, 1.0, Manner::Full);
   if (outcome == Outcome::Unstable) return true;
@@ -117,25 +123,15 @@ void ArcLength::choose_length() {
   refused_ = false;
 }
 
-/// Judges a point; the fault is narrowed down by shorter steps before the path goes on beyond it.
+/// Judges a point; where a fault begins is narrowed down by shorter steps, and the path ends there.
 bool ArcLength::passes(const ArcPoint& next) {
+  if (next.s <= p_.result.load_factor) return true; // on a way back, nothing to be kept
   const Outcome verdict = p_.judge(next.u, next.s);
-  if (verdict == Outcome::Converged) {
-    fault_ = verdict;
-    factors_at_fault_ = -1;
-    return true;
-  }
-  if (returns_ < kReturns) {
-    ++returns_;
-    return false;
-  }
-  fault_ = verdict;
-  if (factors_at_fault_ < 0) factors_at_fault_ = corrector_.factors();
-  return true;
+  if (verdict != Outcome::Converged && returns_++ == kReturns) fault_ = verdict;
+  return verdict == Outcome::Converged;
 }
 
 void ArcLength::keep(const ArcPoint& point) {
-  if (fault_ != Outcome::Converged) return;
   if (point.s <= p_.result.load_factor || point.s > 1.0) return;
   p_.result.u = point.u;
   p_.result.load_factor = point.s;

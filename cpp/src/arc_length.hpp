@@ -27,7 +27,8 @@ class ArcLength {
 
  private:
   bool advance();
-  bool finish(Outcome& outcome);
+  double length_to_whole() const;
+  bool finish(double length, Outcome& outcome);
   bool passes(const ArcPoint& next);
   bool arrive(ArcPoint& next);
   void choose_length();
@@ -44,9 +45,9 @@ class ArcLength {
   double length_ = 0.0;    // of the next step
   double last_ = 0.0;      // of the last one, 0 at the start
   double travelled_ = 0.0; // along the path
-  int factors_at_fold_ = -1, factors_at_fault_ = -1;
+  int factors_at_fold_ = -1;
   Outcome at_end_; // what is wrong with the equilibrium under the whole load, if it was found
-  Outcome fault_ = Outcome::Converged; // of the points last found, by their judge
+  Outcome fault_ = Outcome::Converged; // with which the path ends, by its judge
   int returns_ = 0;                    // to where the fault begins
   bool refused_ = false;               // the last step was
 };

@@ -12,8 +12,8 @@ namespace {
 // Iterations that cost as much as a factorisation, from counts and not from the clock, so that the
 // same problem is solved in the same way each time.
 constexpr double kFactorRate = 0.05; // times flops over entries of L: measured at 10,000 dofs
-constexpr double kMostSaved = 40.0;  // and no more: large factors run at a higher rate
-constexpr int kFewest = 30;          // iterations that are always granted
+constexpr int kLeastSaved = 10, kMostSaved = 40; // small ones cost calls, large ones run faster
+constexpr int kFewest = 30;                      // iterations that are always granted
 
 Mask free_of(const BlockPattern& pattern, const Reduction& reduction) {
   Mask free = Mask::Constant(pattern.dofs(), false);
@@ -78,8 +78,8 @@ FactorStatus InverseSolver::keep(Factor& factor) {
 }
 
 int InverseSolver::break_even() const {
-  const double entries = std::max(kept_->nonzeros(), 1.0);
-  return static_cast<int>(std::min(kMostSaved, kFactorRate * kept_->flops() / entries));
+  const double count = kFactorRate * kept_->flops() / std::max(kept_->nonzeros(), 1.0);
+  return std::clamp(static_cast<int>(count), kLeastSaved, kMostSaved);
 }
 
 /// D y on all dofs.

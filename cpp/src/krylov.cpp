@@ -11,36 +11,42 @@ namespace {
 
 constexpr int kTrial = 8;         // iterations that show the rate
 constexpr double kPatience = 2.0; // predicted iterations over the limit at which it gives up
+constexpr double kLost = 1e-14;   // of a vector: what is left of it is rounding
 
 /// The least squares problem min ‖β e₁ − H y‖ by Givens rotations, one column at a time.
 class HessenbergLeastSquares {
  public:
   explicit HessenbergLeastSquares(double beta) : rhs_{beta} {}
 
-  /// Add the column h (k + 2) of the k-th iteration; returns the residual's norm.
-  double add(std::vector<double> h) {
+  /// Add the column h (k + 2) of the k-th iteration, of a vector of length `size`; false if the
+  /// matrix is singular there.
+  bool add(std::vector<double> h, double size) {
     const std::size_t k = columns_.size();
+    const double rounding = kLost * size;
+    if (h[k + 1] <= rounding) h[k + 1] = 0.0;
     for (std::size_t i = 0; i < k; ++i) {
       const double upper = cosine_[i] * h[i] + sine_[i] * h[i + 1];
       h[i + 1] = cosine_[i] * h[i + 1] - sine_[i] * h[i];
       h[i] = upper;
     }
-    const double size = std::hypot(h[k], h[k + 1]);
-    cosine_.push_back(size > 0.0 ? h[k] / size : 1.0);
-    sine_.push_back(size > 0.0 ? h[k + 1] / size : 0.0);
-    h[k] = size;
+    const double pivot = std::hypot(h[k], h[k + 1]);
+    if (pivot <= rounding) return false;
+    cosine_.push_back(h[k] / pivot);
+    sine_.push_back(h[k + 1] / pivot);
+    h[k] = pivot;
     rhs_.push_back(-sine_[k] * rhs_[k]);
     rhs_[k] *= cosine_[k];
     columns_.push_back(std::move(h));
-    return std::abs(rhs_[k + 1]);
+    return true;
   }
 
-  /// Coefficients of the basis vectors; directions that A maps to nothing get none.
+  double residual() const { return std::abs(rhs_.back()); }
+
+  /// Coefficients of the basis vectors.
   std::vector<double> solution() const {
     std::vector<double> y(rhs_.begin(), rhs_.end() - 1);
     for (std::size_t k = y.size(); k-- > 0;) {
-      const double pivot = columns_[k][k];
-      y[k] = pivot > 0.0 ? y[k] / pivot : 0.0;
+      y[k] /= columns_[k][k];
       for (std::size_t i = 0; i < k; ++i)
         y[i] -= columns_[k][i] * y[k];
     }
@@ -100,14 +106,15 @@ GmresReport gmres(const Operator& matrix, const Operator& preconditioner, const 
     basis.push_back(w / length);
     preconditioner(basis.back(), z);
     matrix(z, w);
+    const double size = w.norm();
     std::vector<double> column = orthogonalise(basis, w);
     length = column.back();
-    if (!std::isfinite(length)) break;
-    report.residual = small.add(std::move(column)) / scale;
     ++report.iterations;
+    if (!std::isfinite(length) || !small.add(std::move(column), size)) break;
+    report.residual = small.residual() / scale;
   }
-  if (report.iterations > 0) {
-    const std::vector<double> y = small.solution();
+  const std::vector<double> y = small.solution();
+  if (!y.empty()) {
     w.setZero();
     for (std::size_t k = 0; k < y.size(); ++k)
       w += y[k] * basis[k];

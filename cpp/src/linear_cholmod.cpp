@@ -1,4 +1,5 @@
-/// Symmetric factorisations by CHOLMOD: supernodal LLᵀ and simplicial LDLᵀ.
+/// Symmetric factorisations by CHOLMOD: supernodal LLᵀ, and simplicial LDLᵀ as a reference for
+/// tests: it is right and slow.
 #include <algorithm>
 #include <cmath>
 

@@ -9,6 +9,8 @@ namespace supple {
 
 namespace {
 
+constexpr double kSmallestStep = 1.0 / 64.0; // of the load, where it is halved
+
 /// Follows the path from load to load.
 class Path {
  public:
@@ -31,7 +33,20 @@ class Path {
   Outcome adaptive_steps() {
     Outcome outcome = p_.settings.follow ? Outcome::Stalled : reach(1.0, Manner::Full);
     if (ends(outcome) && p_.minimises && !p_.settings.follow) outcome = reach(1.0, Manner::Guarded);
-    return ends(outcome) ? ArcLength(p_, step_, verdict_).run() : outcome;
+    if (ends(outcome)) outcome = ArcLength(p_, step_, verdict_).run();
+    return outcome == Outcome::Stalled && p_.minimises ? halved_steps() : outcome;
+  }
+
+  /// From where the path was lost, along the energy: slow, but no stiffness is too uneven for it.
+  Outcome halved_steps() {
+    double step = 1.0 - p_.result.load_factor;
+    while (p_.result.load_factor < 1.0) {
+      const double target = std::min(1.0, p_.result.load_factor + step);
+      const Outcome outcome = reach(target, Manner::Guarded);
+      step = ends(outcome) ? 0.5 * (target - p_.result.load_factor) : 2.0 * step;
+      if (ends(outcome) && step < kSmallestStep) return outcome;
+    }
+    return Outcome::Converged;
   }
 
   static bool ends(Outcome outcome) { return outcome != Outcome::Converged; }

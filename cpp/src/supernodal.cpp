@@ -164,38 +164,48 @@ class Supernodal final : public Backend {
   std::int64_t front(Index s, double* work) {
     const Supernode& node = tree_.node[at(s)];
     const Supernode& next = tree_.node[at(s) + 1];
-    const Index k = node.columns, m = node.below;
     std::fill(factor_.get() + node.panel, factor_.get() + next.panel, 0.0);
     for (std::size_t e = node.slots; e < next.slots; ++e)
       factor_.get()[node.panel + tree_.slot[e].target] += values_[tree_.slot[e].source];
     for_children(s, [&](const Supernode& child) { add_to_panel(child, node); });
     dense::PivotGuard guard{scale_.data() + node.first};
-    const Block l = lower(node), below = l.from(k, 0);
-    Block product{work, m}; // (m, k) with L₂₁ productᵀ the update
+    const Block below = lower(node).from(node.columns, 0);
     if (lu_) {
-      product = upper(node);
-      Index* const pivot = pivot_.data() + node.first;
-      dense::factor_lu(l, k, pivot, guard);
-      for (Index j = 0; j < k; ++j)
-        if (pivot[j] != j)
-          std::swap_ranges(&product(0, j), &product(0, j) + m, &product(0, pivot[j]));
-      dense::divide_by_lower(product, m, l, k);
-      dense::divide_by_upper(below, m, l, k);
-      dense::subtract_product(update(node), m, m, below, product, k, 0.0);
+      eliminate_lu(node, guard);
+      dense::subtract_product(update(node), node.below, node.below, below, upper(node),
+                              node.columns, 0.0);
     } else {
-      dense::factor_ldlt(l, k, work, guard);
-      dense::divide_by_lower(below, m, l, k);
-      for (Index j = 0; j < k; ++j) {
-        const double reciprocal = 1.0 / l(j, j);
-        for (Index i = 0; i < m; ++i) {
-          product(i, j) = below(i, j);
-          below(i, j) *= reciprocal;
-        }
-      }
-      dense::subtract_lower(update(node), m, below, product, k, 0.0);
+      eliminate_ldlt(node, work, guard);
+      dense::subtract_lower(update(node), node.below, below, {work, node.below}, node.columns, 0.0);
     }
     for_children(s, [&](const Supernode& child) { add_to_update(child, node); });
     return guard.raised;
+  }
+
+  void eliminate_lu(const Supernode& node, dense::PivotGuard& guard) {
+    const Index k = node.columns, m = node.below;
+    const Block l = lower(node), u = upper(node);
+    Index* const pivot = pivot_.data() + node.first;
+    dense::factor_lu(l, k, pivot, guard);
+    for (Index j = 0; j < k; ++j)
+      if (pivot[j] != j) std::swap_ranges(&u(0, j), &u(0, j) + m, &u(0, pivot[j]));
+    dense::divide_by_lower(u, m, l, k);
+    dense::divide_by_upper(l.from(k, 0), m, l, k);
+  }
+
+  /// Leaves L₂₁ D in `work` (m, k).
+  void eliminate_ldlt(const Supernode& node, double* work, dense::PivotGuard& guard) {
+    const Index k = node.columns, m = node.below;
+    const Block l = lower(node), below = l.from(k, 0), product{work, m};
+    dense::factor_ldlt(l, k, work, guard);
+    dense::divide_by_lower(below, m, l, k);
+    for (Index j = 0; j < k; ++j) {
+      const double reciprocal = 1.0 / l(j, j);
+      for (Index i = 0; i < m; ++i) {
+        product(i, j) = below(i, j);
+        below(i, j) *= reciprocal;
+      }
+    }
   }
 
   template <class Use>

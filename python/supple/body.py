@@ -388,10 +388,10 @@ class Body:
         return found
 
     def _unstable_directions(self, u: Floats) -> int:
-        """In which the body buckles at unknowns ``u``; 0 where loads without energy hide it."""
-        system = self._system().system
-        if not system.has_energy():
+        """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
+        if self._description.pressures:
             return 0
+        system = self._system().system
         system.set_free(np.append(~self._fixed.ravel(), np.ones(system.scalars, bool)))
         return int(system.unstable_directions(u))
 

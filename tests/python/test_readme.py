@@ -138,5 +138,5 @@ def assert_alike(drawn: Path, shown: Path) -> None:
     """The same picture up to fonts and lines: one in fifty of the page's brightness."""
     assert shown.stat().st_size < 150_000
     new, old = (np.asarray(Image.open(file).convert("RGB"), dtype=float) for file in (drawn, shown))
-    assert new.shape == old.shape, f"{shown.name}: copy what its page draws"
-    assert np.abs(new - old).mean() < 0.02 * 255, f"{shown.name}: copy what its page draws"
+    assert new.shape == old.shape, f"copy {drawn} to {shown}, and look at it"
+    assert np.abs(new - old).mean() < 0.02 * 255, f"copy {drawn} to {shown}, and look at it"

@@ -128,7 +128,8 @@ struct Reduction {
 /// @throws ShapeError if `free` does not have one entry for each dof.
 Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage);
 
-/// Where the CSR values hold the transposed entry of each that `reduction`, of storage Lower, takes.
+/// Where the CSR values hold the transposed entry of each that `reduction`, of storage Lower,
+/// takes.
 /// @throws ShapeError if it stores the full matrix.
 std::vector<Index> mirror(const BlockPattern& pattern, const Reduction& reduction);
 

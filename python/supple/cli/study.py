@@ -11,6 +11,8 @@ import click
 
 from ._run import Run, command
 from ._study_block import sagging_block
+from ._study_shear import inverse_shear
+from ._study_tetrahedron import single_tetrahedron
 
 
 def _hanging_dome(run: Run) -> None:
@@ -44,8 +46,10 @@ def _manufactured(run: Run) -> None:
 
 _STUDIES: dict[str, Callable[..., None]] = {
     "hanging-dome": _hanging_dome,
+    "inverse-shear": inverse_shear,
     "manufactured": _manufactured,
     "sagging-block": sagging_block,
+    "single-tetrahedron": single_tetrahedron,
 }
 
 
@@ -61,6 +65,8 @@ def study(run: Run, name: str, **options: Any) -> None:
 
     \b
     hanging-dome  rest and supine depth of a prone dome under gravity, beside DOLFINx'
+    inverse-shear simple and generalised shear undone for three laws and four elements: exact
+                  where the field is in the space, else rates; exits with 3 beyond 1e-12
     manufactured  a chosen field given back under its exact loads: rates of convergence of
                   displacement and strain for three laws and four elements; exits with 3 if
                   one is more than 0.1 off its theory
@@ -68,6 +74,9 @@ def study(run: Run, name: str, **options: Any) -> None:
                   the table each, in parallel; stopped, it goes on with --resume; exits with 3
                   if a rest shape misses the cube by more than 1e-9 m (--samples, --seed,
                   --jobs, --resume; --convergence)
+    single-tetrahedron
+                  153 loaded tetrahedra taken back by one inverse solve and by Sellier's
+                  method; exits with 3 if the inverse fails or misses by 1e-12 m (--seed)
     """
     given = {
         key: value for key, value in options.items() if value is not None and value is not False

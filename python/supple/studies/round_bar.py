@@ -59,7 +59,7 @@ def _disk(n: int) -> tuple[Floats, Ints]:
 
 
 def _tetrahedra(quads: Ints, step: int) -> Ints:
-    """Three a prism, six a block; diagonals start at the lower number, so that neighbours agree; either way round."""
+    """Three a prism, six a block; diagonals start at the lower number, so that neighbours agree."""
     a, b, c = np.sort(np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), axis=1).T
     tets = [(a, b, c, c + step), (a, b, b + step, c + step), (a, a + step, b + step, c + step)]
     return np.concatenate([np.stack(t, axis=1) for t in tets])

@@ -1,0 +1,181 @@
+"""`make bench`: what a rest shape costs beside a forward solve of the same body and load.
+
+    cases → forward, inverse, Anderson–Sellier, in turn → check → rest_shape.md and .json in --out
+
+Each time is the wall time of `solve` or `rest_shape` of a new body, kernels compiled before: the
+symbolic analysis counts. Ratios are medians of the ratios within a round, so that a busy machine
+slows both sides. A rest shape is checked before it is timed: loaded again it is the mesh, to 1e-9.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import supple
+
+#: Case → body. Cantilever: the benchmark's, 80 × 15 × 15 m under a dead traction on its end. Block:
+#: a cube of 0.1 m and 1 kPa on its base, leaning under its weight.
+CASES: dict[str, Callable[[], supple.Body]] = {
+    "cantilever P1, 10,000": lambda: cantilever((44, 8, 8), "P1"),
+    "cantilever P2, 10,000": lambda: cantilever((15, 5, 5), "P2"),
+    "cantilever mixed, 10,000": lambda: cantilever((15, 5, 5), "P2", mixed=True),
+    "block P1, 10,000": lambda: block(14, "P1"),
+    "block P2, 10,000": lambda: block(7, "P2"),
+    "block mixed, 10,000": lambda: block(7, "P2", mixed=True),
+}
+LARGE: dict[str, Callable[[], supple.Body]] = {
+    "cantilever P1, 100,000": lambda: cantilever((95, 18, 18), "P1"),
+    "cantilever P2, 100,000": lambda: cantilever((46, 9, 9), "P2"),
+}
+#: Most that the inverse may cost, in forward solves: by dofs and formulation.
+BARS = {"10,000": 1.3, "100,000": 2.0, "mixed": 2.0}
+ANDERSON_BAR = 5.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """Medians of one case: seconds, and ratios within a round; strain is max |stretch - 1|."""
+
+    case: str
+    dofs: int
+    strain: float
+    forward_s: float
+    inverse_s: float
+    anderson_s: float | None
+    ratio: float
+    bar: float
+    anderson_ratio: float | None
+    iterations: tuple[int, int]
+    factorisations: tuple[int, int]
+    krylov_iterations: int
+
+
+def cantilever(cells: tuple[int, int, int], element: str, mixed: bool = False) -> supple.Body:
+    """Clamped at x = 0, (0, -10, 0) Pa on x = 80."""
+    mesh = supple.Mesh.box(cells, (80.0, 15.0, 15.0), element)
+    body = soft(mesh, 3e3, mixed, 0.0)
+    return body.fix(lambda x: x[:, 0] < 1e-9).traction(
+        lambda x: x[:, 0] > 80.0 - 1e-9, (0.0, -10.0, 0.0)
+    )
+
+
+def block(cells: int, element: str, mixed: bool = False) -> supple.Body:
+    """Fixed at z = 0; gravity draws it upwards and sideways."""
+    mesh = supple.Mesh.box((cells,) * 3, (0.1,) * 3, element)
+    return soft(mesh, 1e3, mixed, 1e3).fix(lambda x: x[:, 2] < 1e-9).gravity((0.0, 0.5, 1.0))
+
+
+def soft(mesh: supple.Mesh, young: float, mixed: bool, density: float) -> supple.Body:
+    """Neo-Hookean; the mixed body with a bulk modulus of a hundred shear moduli."""
+    if not mixed:
+        return supple.Body(mesh, "neo_hookean", density=density, young=young, poisson=0.3)
+    values = {"mu": young / 3, "bulk": 100 * young / 3}
+    return supple.Body(mesh, "neo_hookean_isochoric", "mixed", density=density, **values)
+
+
+def timed(call: Callable[[], Any]) -> tuple[float, Any]:
+    """Wall seconds and the result."""
+    begin = time.perf_counter()
+    result = call()
+    return time.perf_counter() - begin, result
+
+
+def measure(case: str, make: Callable[[], supple.Body], repeats: int, anderson: bool) -> Row:
+    """Forward, inverse and Anderson–Sellier in turn, after the inverse was checked."""
+    body = make()
+    error = supple.round_trip_error(body, body.rest_shape(), near=True)
+    if error > 1e-9:
+        sys.exit(f"{case}: loaded again, the rest shape misses by {error:.1e} > 1e-9; not timed")
+    times: list[tuple[float, float, float]] = []
+    for _ in range(repeats):
+        forward, state = timed(make().solve)
+        inverse, rest = timed(make().rest_shape)
+        fixed_point = float("nan")
+        if anderson:
+            fixed_point, other = timed(partial(make().rest_shape, method="sellier-anderson"))
+            away = abs(other.points - rest.points).max() / body.mesh.size
+            if away > 1e-8:
+                sys.exit(f"{case}: Anderson–Sellier is off by {away:.1e}, more than 1e-8")
+        times.append((forward, inverse, fixed_point))
+    stretches = np.linalg.svd(rest.deformation_gradient(), compute_uv=False)
+    bar = BARS["mixed" if "mixed" in case else case.split(", ")[1]]
+    return Row(
+        case,
+        body.mesh.points.size,
+        float(abs(stretches - 1).max()),
+        statistics.median(t[0] for t in times),
+        statistics.median(t[1] for t in times),
+        statistics.median(t[2] for t in times) if anderson else None,
+        statistics.median(t[1] / t[0] for t in times),
+        bar,
+        statistics.median(t[2] / t[1] for t in times) if anderson else None,
+        (state.iterations, rest.iterations),
+        (int(state.timings["factorisations"]), int(rest.timings["factorisations"])),
+        int(rest.timings["krylov_iterations"]),
+    )
+
+
+def table(rows: list[Row], machine: str) -> str:
+    """Markdown."""
+    lines = [
+        "# The rest shape beside a forward solve",
+        "",
+        machine,
+        "",
+        "Wall seconds of a cold call; forward → inverse for iterations and factorisations.",
+        "",
+        "| case | dofs | strain | forward | inverse | **ratio** | bar | iterations | "
+        "factorisations | GMRES | Anderson–Sellier | its ratio |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for r in rows:
+        other, times = "–", "–"
+        if r.anderson_s is not None and r.anderson_ratio is not None:
+            other, times = f"{r.anderson_s:.2f}", f"{r.anderson_ratio:.1f}"
+        lines.append(
+            f"| {r.case} | {r.dofs} | {r.strain:.2f} | {r.forward_s:.2f} | {r.inverse_s:.2f} | "
+            f"**{r.ratio:.2f}** | {r.bar} | {r.iterations[0]} → {r.iterations[1]} | "
+            f"{r.factorisations[0]} → {r.factorisations[1]} | {r.krylov_iterations} | "
+            f"{other} | {times} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure and write."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--repeats", type=int, default=3)
+    options.add_argument("--skip-large", action="store_true", help="leave out 100,000 dofs")
+    options.add_argument("--out", type=Path, default=Path("out/bench"))
+    given = options.parse_args()
+    load = os.getloadavg()[0]
+    rows = [measure(case, make, given.repeats, True) for case, make in CASES.items()]
+    if not given.skip_large:
+        rows += [measure(case, make, 1, False) for case, make in LARGE.items()]
+    machine = (
+        f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} before the run, "
+        f"{given.repeats} repeats, `make bench`."
+    )
+    given.out.mkdir(parents=True, exist_ok=True)
+    text = table(rows, machine)
+    (given.out / "rest_shape.md").write_text(text, encoding="utf-8")
+    report = {"machine": machine, "rows": [asdict(r) for r in rows]}
+    (given.out / "rest_shape.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,288 @@
+"""How far each way to a rest shape goes, and what it costs: inverse solve against fixed points.
+
+    bodies → largest gravity that each method can take off → race at loads that all take → table
+
+The mesh is the loaded shape; gravity grows until a method fails, and bisection finds where. It
+succeeds if a forward solve from its rest shape has a stable equilibrium at the loaded shape, every
+node within 1e-9 of the size. A method may spend 500 Newton iterations; the inverse solve takes
+about ten. Races are to 1e-12, cold, in turn, best of three.
+"""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..body import Body
+from ..errors import ConvergenceError
+from ..files import replacing
+from ..mesh import Mesh
+from ..rest_check import reversed_gravity_error, round_trip_error
+from ..state import Rest
+
+#: Newton iterations after which a method has failed.
+BUDGET = 500
+#: Factor between loads on the way up, and bisections after it: limits are within 2.2 %.
+GROWTH, BISECTIONS = 1.4, 4
+#: Loads of the race as shares of a limit: the least of all methods, and the least of Anderson's.
+EASY, HARD = 0.8, 0.95
+RACE_TOLERANCE, ACCEPTED, REPEATS = 1e-12, 1e-9, 3
+
+#: What `Body.rest_shape` is given, by name.
+METHODS: dict[str, dict[str, Any]] = {
+    "inverse": {},
+    "sellier": {"method": "sellier"},
+    "aitken": {"method": "sellier-aitken"},
+    "anderson": {"method": "sellier-anderson"},
+    "anderson, half steps": {"method": "sellier-anderson", "relaxation": 0.5, "depth": 20},
+}
+#: Of the race: forward solves exact, and each from zero as in Sellier's own algorithm.
+RACERS = METHODS | {
+    "anderson, exact solves": {"method": "sellier-anderson", "exact": True},
+    "anderson, exact from zero": {"method": "sellier-anderson", "exact": True, "warm": False},
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A body under a multiple of gravity, as loaded; ``start`` is a multiple that all can take."""
+
+    name: str
+    make: Callable[[float], Body]
+    start: float = 0.2
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One rest shape, or why there is none."""
+
+    seconds: float
+    rest: Rest | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Largest multiple of gravity that succeeded, the least above it that failed, and why."""
+
+    method: str
+    good: float
+    bad: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Racer:
+    """A method at a common load; ``seconds`` the best of all repeats, NaN where it failed."""
+
+    method: str
+    load: str
+    factor: float
+    seconds: float
+    solves: int
+    iterations: int
+    miss: float
+
+
+@dataclass
+class Outcome:
+    """All about one body."""
+
+    case: str
+    limits: list[Limit]
+    racers: list[Racer]
+    reversed_gravity: dict[str, float] = field(default_factory=dict)  # by load
+
+    def limit(self, method: str) -> float:
+        return next(found.good for found in self.limits if found.method == method)
+
+    def ratio(self, method: str, load: str) -> float:
+        """Seconds over those of the inverse; NaN where one has failed."""
+        seconds = {r.method: r.seconds for r in self.racers if r.load == load}
+        return seconds.get(method, np.nan) / seconds.get("inverse", np.nan)
+
+
+def block(factor: float) -> Body:
+    """The unit cube of Mazier 2022, 3.3.2, mixed P2–P1, but held at its side, so that it sags.
+
+    On its base, as there, it buckles at 2.5 g before a method fails, and all limits are the same.
+    """
+    mesh = Mesh.box((3, 3, 3), (1.0, 1.0, 1.0), "P2")
+    body = Body(mesh, "neo_hookean_isochoric", "mixed", density=1e3, mu=2e4, bulk=8e5)
+    return body.fix(lambda x: x[:, 0] < 1e-9).gravity((0.0, -9.81 * factor, 0.0))
+
+
+def beam(factor: float) -> Body:
+    """The PDMS beam of Mazier 2022, 3.5, with a square section: mixed P2–P1, 12 blocks."""
+    mesh = Mesh.box((12, 1, 1), (0.182, 0.0085, 0.0085), "P2")
+    body = Body(
+        mesh, "mooney_rivlin", "mixed", density=965.0, c1=101709.668, c2=151065.46, bulk=1.593e9
+    )
+    return body.fix(lambda x: x[:, 0] < 1e-9).gravity((0.0, -9.81 * factor, 0.0))
+
+
+def round_beam(mesh: Mesh, factor: float) -> Body:
+    """Beam2k.msh itself with linear tetrahedra, which are too stiff in bending; E = 6 (c1 + c2)."""
+    body = Body(mesh, "neo_hookean", density=965.0, young=1.517e6, poisson=0.3)
+    return body.fix(lambda x: x[:, 0] < 1e-9).gravity((0.0, -9.81 * factor, 0.0))
+
+
+def liver(mesh: Mesh, factor: float) -> Body:
+    """SOFA's liver, 19 cm wide, hanging on its uppermost 15 mm."""
+    body = Body(mesh, "neo_hookean", density=1e3, young=5e3, poisson=0.45)
+    top = mesh.points[:, 1].max() - 0.015
+    return body.fix(lambda x: x[:, 1] > top).gravity((0.0, -9.81 * factor, 0.0))
+
+
+def cases(data: Path | None) -> list[Case]:
+    """Block and beam; with the folder of meshes ``data`` also the round beam and the liver."""
+    found = [Case("block", block), Case("beam", beam)]
+    if data is None:
+        return found
+    pdms = Mesh.read(data / "beam_pdms" / "Beam2k.msh", unit="m")
+    organ = Mesh.read(data / "liver_sofa" / "liver.msh", unit="m")
+    organ = Mesh(0.03 * organ.points, organ.cells, "P1")  # its unit is none; so it is 19 cm wide
+    return [
+        *found,
+        Case("Beam2k.msh", lambda factor: round_beam(pdms, factor)),
+        Case("liver", lambda factor: liver(organ, factor)),
+    ]
+
+
+class _Spent(Exception):
+    """The budget of Newton iterations is used up."""
+
+
+def attempt(body: Body, **how: Any) -> Attempt:
+    """One rest shape within the budget."""
+    spent = 0
+
+    def count(row: dict[str, float]) -> None:
+        nonlocal spent
+        spent += row["iteration"] > 0
+        if spent > BUDGET:
+            raise _Spent
+
+    if how:
+        how = {"max_solves": BUDGET, **how}
+    begin = time.perf_counter()
+    try:
+        rest = body.rest_shape(progress=count, **how)
+    except _Spent:
+        return Attempt(time.perf_counter() - begin, None, f"{BUDGET} Newton iterations are spent")
+    except ConvergenceError as failure:
+        return Attempt(time.perf_counter() - begin, None, failure.cause)
+    return Attempt(time.perf_counter() - begin, rest)
+
+
+def judged(body: Body, tried: Attempt) -> Attempt:
+    """The same, but no rest shape if the loaded shape is no stable equilibrium of it."""
+    if tried.rest is None:
+        return tried
+    try:
+        miss = round_trip_error(body, tried.rest, near=True)
+    except ConvergenceError as failure:
+        return Attempt(tried.seconds, None, f"found, but loaded again: {failure.cause}")
+    why = f"found, but loaded again it misses by {miss:.1e}"
+    return tried if miss <= ACCEPTED else Attempt(tried.seconds, None, why)
+
+
+def limit(case: Case, method: str, progress: Callable[[str], None]) -> Limit:
+    """Up in steps until the method fails, then bisection between the last two loads."""
+
+    def reaches(factor: float) -> str | None:
+        progress(f"{case.name}: {method} at {factor:.3g} g")
+        body = case.make(factor)
+        found = judged(body, attempt(body, **METHODS[method]))
+        return None if found.rest is not None else found.why
+
+    good, bad = 0.0, case.start
+    while (why := reaches(bad)) is None:
+        good, bad = bad, GROWTH * bad
+    for _ in range(BISECTIONS):
+        middle = float(np.sqrt(good * bad)) if good else 0.5 * bad
+        found = reaches(middle)
+        if found is None:
+            good = middle
+        else:
+            bad, why = middle, found
+    return Limit(method, good, bad, why)
+
+
+def race(case: Case, load: str, factor: float, progress: Callable[[str], None]) -> list[Racer]:
+    """All racers in turn, several times, each on a fresh body."""
+    tries: dict[str, list[Attempt]] = {name: [] for name in RACERS}
+    for _ in range(REPEATS):
+        for name, how in RACERS.items():
+            progress(f"{case.name}: race of {name} at {factor:.3g} g")
+            finer = {"tolerance": RACE_TOLERANCE} if how else {}
+            if not tries[name] or tries[name][-1].rest is not None:
+                tries[name].append(attempt(case.make(factor), **how, **finer))
+    body = case.make(factor)
+    return [_racer(body, name, load, factor, tried) for name, tried in tries.items()]
+
+
+def _racer(body: Body, name: str, load: str, factor: float, tried: list[Attempt]) -> Racer:
+    rest = tried[0].rest
+    if rest is None:
+        return Racer(name, load, factor, float("nan"), 0, 0, float("nan"))
+    seconds = min(one.seconds for one in tried)
+    miss = round_trip_error(body, rest, near=True)
+    return Racer(name, load, factor, seconds, rest.solves, rest.iterations, miss)
+
+
+def run(case: Case, progress: Callable[[str], None] = lambda _: None) -> Outcome:
+    """Limits, then races at a load that every method takes and at one near Anderson's limit."""
+    outcome = Outcome(case.name, [limit(case, name, progress) for name in METHODS], [])
+    plain = min(found.good for found in outcome.limits)
+    hard = HARD * min(outcome.limit(name) for name in METHODS if name.startswith("anderson"))
+    for load, factor in (("easy", EASY * plain), ("hard", hard)):
+        outcome.racers += race(case, load, factor, progress)
+        body = case.make(factor)
+        outcome.reversed_gravity[load] = reversed_gravity_error(body, body.rest_shape())
+    return outcome
+
+
+def beaten(outcome: Outcome) -> list[str]:
+    """Sentences for each way in which the inverse is not ahead; none if it is."""
+    inverse, doubts = outcome.limit("inverse"), []
+    for found in outcome.limits:
+        if found.method != "inverse" and found.good >= inverse:
+            doubts.append(f"{outcome.case}: {found.method} takes {found.good:.3g} g off, "
+                          f"inverse {inverse:.3g} g")  # fmt: skip
+    for load in outcome.reversed_gravity:
+        for name in RACERS:
+            if outcome.ratio(name, load) < 1:
+                doubts.append(f"{outcome.case}, {load} load: {name} is quicker than inverse")
+    return doubts
+
+
+def write(outcomes: list[Outcome], path: Path) -> Path:
+    """The table as CSV; lengths are shares of the size, loads multiples of gravity."""
+    head = ["body", "method", "gravity_limit", "fails_at", "why", "load", "gravity", "solves",
+            "newton_iterations", "seconds", "over_inverse", "miss", "reversed_gravity_error"]  # fmt: skip
+    with replacing(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(head)
+        for o in outcomes:
+            limits = {found.method: found for found in o.limits}
+            for r in o.racers:
+                end = limits.get(r.method)
+                until = (
+                    ("", "", "") if end is None else (_short(end.good), _short(end.bad), end.why)
+                )
+                ratio, shortcut = o.ratio(r.method, r.load), o.reversed_gravity[r.load]
+                table.writerow([o.case, r.method, *until, r.load, _short(r.factor), r.solves,
+                                r.iterations, _short(r.seconds), _short(ratio), _short(r.miss),
+                                _short(shortcut)])  # fmt: skip
+    return path
+
+
+def _short(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.3g}"
