@@ -389,9 +389,9 @@ class Body:
 
     def _unstable_directions(self, u: Floats) -> int:
         """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
-        if self._description.pressures:
-            return 0
         system = self._system().system
+        if not system.has_energy():
+            return 0
         system.set_free(np.append(~self._fixed.ravel(), np.ones(system.scalars, bool)))
         return int(system.unstable_directions(u))
 
