@@ -389,6 +389,8 @@ class Body:
 
     def _unstable_directions(self, u: Floats) -> int:
         """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
+        if self._description.pressures:  # which have none: nothing needs to be built
+            return 0
         system = self._system().system
         if not system.has_energy():
             return 0

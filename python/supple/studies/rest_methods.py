@@ -266,7 +266,8 @@ def beaten(outcome: Outcome) -> list[str]:
 def write(outcomes: list[Outcome], path: Path) -> Path:
     """The table as CSV; lengths are shares of the size, loads multiples of gravity."""
     head = ["body", "method", "gravity_limit", "fails_at", "why", "load", "gravity", "solves",
-            "newton_iterations", "seconds", "over_inverse", "miss", "reversed_gravity_error"]  # fmt: skip
+            "newton_iterations", "seconds", "over_inverse", "miss",
+            "reversed_gravity_error"]  # fmt: skip
     with replacing(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(head)
