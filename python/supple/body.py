@@ -353,6 +353,8 @@ class Body:
         judge: newton.Judge | None = None,
     ) -> tuple[Any, terms.Built]:
         native = settings.checked(self._rounding(), self.mesh)
+        if start is None and self._is_stressed():
+            start = self._unloaded(settings, inverse)
         native.warm = start is not None
         native.kinks = bool(self._description.skins or self._description.slides)
         supports.require_held(self.mesh, self._fixed, self._normals())
@@ -370,6 +372,21 @@ class Body:
         else:
             start[self._prescribed.size :] /= built.scalar_unit
         return newton.solve(built.system, start, target, native, settings, judge), built
+
+    def _is_stressed(self) -> bool:
+        """Whether a law is under stress at rest, so that no load is no equilibrium at u = 0."""
+        return any("stress_free" in r.law.exceptions for r in self._description.regions)
+
+    def _unloaded(self, settings: Settings, inverse: bool) -> Floats | None:
+        """Unknowns in equilibrium without loads, where the way to the load begins; None if lost."""
+        body = self.on(self.mesh).clear_loads()
+        start = unknowns(body, np.zeros_like(self.mesh.points))
+        result, built = body._run(replace(settings, progress=None), start, inverse)
+        if result.outcome.name != "converged":
+            return None
+        found = np.array(result.u)
+        found[self._prescribed.size :] *= built.scalar_unit
+        return found
 
     def _unstable_directions(self, u: Floats) -> int:
         """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
