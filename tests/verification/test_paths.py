@@ -1,7 +1,8 @@
-"""Paths of equilibria past their limit points: one-dof closed forms, stability, time of failures."""
+"""Paths of equilibria past their limit points: closed forms of one dof, stability, failing times."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from time import process_time
 
 import numpy as np
@@ -135,10 +136,8 @@ def seconds(attempt):
     times = []
     for _ in range(3):
         start = process_time()
-        try:
+        with suppress(supple.ConvergenceError):
             attempt()
-        except supple.ConvergenceError:
-            pass
         times.append(process_time() - start)
     return min(times)
 
