@@ -111,7 +111,8 @@ bool ArcLength::arrive(ArcPoint& next) {
   const double s = next.s;
   if (!corrector_.correct(next, p_.settings.kinks ? kKinks : kLoose)) return false;
   const double moved = corrector_.square(next.u - u, next.s - s);
-  if (moved > kLost * kLost * length_ * length_) return false; // perhaps another branch
+  const bool lost = moved > kLost * kLost * length_ * length_; // perhaps to another branch
+  if (lost && !p_.settings.kinks) return false;
   const bool far = moved > kFar * kFar * length_ * length_;
   return !(far || here_.ds * next.ds < 0.0) || corrector_.refresh(next);
 }

@@ -1,4 +1,4 @@
-"""Paths of equilibria past their limit points: closed forms of one dof, stability, failing times."""
+"""Paths of equilibria past limit points: closed forms of one dof, stability, times of failures."""
 
 from __future__ import annotations
 
