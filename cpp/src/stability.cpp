@@ -14,10 +14,9 @@ std::int64_t unstable_directions(System& system, const ConstVector& u) {
   if (system.kind() == Kind::Unsymmetric)
     throw StateError("stability needs loads with an energy; a pressure that follows has none");
   system.assemble_tangent(u, 1.0);
-  const bool definite = system.factorise().ok();
   if (system.kind() == Kind::QuasiDefinite)
-    return definite ? unstable_directions_of_saddle(system) : 1;
-  return definite ? 0 : system.inertia().negative;
+    return system.factorise().ok() ? unstable_directions_of_saddle(system) : 1;
+  return system.inertia().negative; // of LDLᵀ, whose analysis the inverse form has made already
 }
 
 std::int64_t unstable_directions_of_saddle(System& system) {

@@ -58,11 +58,11 @@ class Supernodal final : public Backend {
   void analyse(const CscPattern& pattern) override {
     pattern_ = &pattern;
     const int threads = omp_get_max_threads();
-    TreeReport report = make_tree(pattern, threads > 1 ? kBranches * threads : 1);
-    tree_ = std::move(report.tree);
-    flops_ = report.flops * (lu_ ? 2.0 : 1.0);
-    nonzeros_ = lu_ ? 2.0 * report.nonzeros - static_cast<double>(pattern.size) : report.nonzeros;
-    ordering_ = report.ordering;
+    analysis_ = shared_tree(pattern, threads > 1 ? kBranches * threads : 1);
+    const double entries = analysis_->nonzeros;
+    flops_ = analysis_->flops * (lu_ ? 2.0 : 1.0);
+    nonzeros_ = lu_ ? 2.0 * entries - static_cast<double>(pattern.size) : entries;
+    ordering_ = analysis_->ordering;
     scale_.resize(pattern.size);
     x_.resize(pattern.size);
     pivot_.resize(lu_ ? at(pattern.size) : 0);
@@ -71,34 +71,34 @@ class Supernodal final : public Backend {
   FactorStatus factorise(double* values) override {
     values_ = values;
     measure_columns();
-    factor_.sized(tree_.panels);
-    updates_.sized(tree_.updates);
+    factor_.sized(tree().panels);
+    updates_.sized(tree().updates);
     work_.resize(at(std::max(omp_get_max_threads(), 1)));
     for (Array& work : work_)
-      work.sized(tree_.tallest_product);
+      work.sized(tree().tallest_product);
     raised_ = 0;
     factorise_branches();
-    for (const Index s : tree_.trunk)
+    for (const Index s : tree().trunk)
       raised_ += front(s, work_[0].get());
     return {};
   }
 
   void solve(const double* rhs, double* x) override {
     for (Eigen::Index j = 0; j < x_.size(); ++j)
-      x_[j] = rhs[tree_.order[at(j)]];
-    for (Index s = 0; s < tree_.size(); ++s)
-      forward(tree_.node[at(s)]);
-    for (Index s = tree_.size() - 1; s >= 0; --s)
-      backward(tree_.node[at(s)]);
+      x_[j] = rhs[tree().order[at(j)]];
+    for (Index s = 0; s < tree().size(); ++s)
+      forward(tree().node[at(s)]);
+    for (Index s = tree().size() - 1; s >= 0; --s)
+      backward(tree().node[at(s)]);
     for (Eigen::Index j = 0; j < x_.size(); ++j)
-      x[tree_.order[at(j)]] = x_[j];
+      x[tree().order[at(j)]] = x_[j];
   }
 
   Inertia inertia() const override {
     Inertia result;
     Vector diagonal = Vector::Zero(x_.size()); // of |L||D||Lᵀ|
-    for (Index s = 0; s < tree_.size(); ++s) {
-      const Supernode& node = tree_.node[at(s)];
+    for (Index s = 0; s < tree().size(); ++s) {
+      const Supernode& node = tree().node[at(s)];
       const Panel l = panel(node);
       for (Index j = 0; j < node.columns; ++j) {
         const double pivot = l(j, j), size = std::abs(pivot);
@@ -131,17 +131,17 @@ class Supernodal final : public Backend {
           largest[pattern_->row[at(e)]] = std::max(largest[pattern_->row[at(e)]], size);
       }
     for (Eigen::Index j = 0; j < scale_.size(); ++j)
-      scale_[j] = largest[tree_.order[at(j)]];
+      scale_[j] = largest[tree().order[at(j)]];
   }
 
   void factorise_branches() {
-    const auto count = static_cast<Index>(tree_.branch.size());
+    const auto count = static_cast<Index>(tree().branch.size());
     const int threads = count > 1 && flops_ > kWorthThreads ? static_cast<int>(work_.size()) : 1;
     const auto one_thread = threads > 1 ? std::make_unique<BlasThreads>(1) : nullptr;
     std::int64_t raised = 0;
 #pragma omp parallel for num_threads(threads) schedule(dynamic) reduction(+ : raised)
     for (Index b = 0; b < count; ++b) {
-      const Range& range = tree_.branch[at(b)];
+      const Range& range = tree().branch[at(b)];
       for (Index s = range.begin; s < range.end; ++s)
         raised += front(s, work_[at(omp_get_thread_num())].get());
     }
@@ -158,15 +158,16 @@ class Supernodal final : public Backend {
     return {factor_.get() + node.panel, node.height(), node.columns,
             Eigen::OuterStride<>(node.height())};
   }
-  Index row(const Supernode& node, Index i) const { return tree_.row[at(node.rows + i)]; }
+  const SupernodeTree& tree() const { return analysis_->tree; }
+  Index row(const Supernode& node, Index i) const { return tree().row[at(node.rows + i)]; }
 
   /// Assemble and eliminate one supernode; how many pivots had to be raised.
   std::int64_t front(Index s, double* work) {
-    const Supernode& node = tree_.node[at(s)];
-    const Supernode& next = tree_.node[at(s) + 1];
+    const Supernode& node = tree().node[at(s)];
+    const Supernode& next = tree().node[at(s) + 1];
     std::fill(factor_.get() + node.panel, factor_.get() + next.panel, 0.0);
     for (std::size_t e = node.slots; e < next.slots; ++e)
-      factor_.get()[node.panel + tree_.slot[e].target] += values_[tree_.slot[e].source];
+      factor_.get()[node.panel + tree().slot[e].target] += values_[tree().slot[e].source];
     for_children(s, [&](const Supernode& child) { add_to_panel(child, node); });
     dense::PivotGuard guard{scale_.data() + node.first};
     const Block below = lower(node).from(node.columns, 0);
@@ -210,11 +211,11 @@ class Supernodal final : public Backend {
 
   template <class Use>
   void for_children(Index s, Use use) const {
-    for (Index c = tree_.child_start[at(s)]; c < tree_.child_start[at(s) + 1]; ++c)
-      use(tree_.node[at(tree_.child[at(c)])]);
+    for (Index c = tree().child_start[at(s)]; c < tree().child_start[at(s) + 1]; ++c)
+      use(tree().node[at(tree().child[at(c)])]);
   }
 
-  const Index* places(const Supernode& child) const { return tree_.place.data() + child.rows; }
+  const Index* places(const Supernode& child) const { return tree().place.data() + child.rows; }
   /// Rows of the child that are columns of its parent's panel.
   Index taken(const Supernode& child, const Supernode& node) const {
     const Index* const place = places(child);
@@ -284,7 +285,7 @@ class Supernodal final : public Backend {
   bool lu_;
   const CscPattern* pattern_ = nullptr;
   const double* values_ = nullptr;
-  SupernodeTree tree_;
+  std::shared_ptr<const TreeReport> analysis_;
   Array factor_, updates_;
   std::vector<Array> work_; // of each thread
   std::vector<Index> pivot_;

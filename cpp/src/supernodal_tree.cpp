@@ -1,8 +1,10 @@
 #include "supernodal_tree.hpp"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <limits>
+#include <mutex>
 #include <numeric>
 
 #include "cholmod_library.hpp"
@@ -240,6 +242,10 @@ CscPattern symmetric_lower(const CscPattern& full) {
   return lower;
 }
 
+bool same(const CscPattern& a, const CscPattern& b) {
+  return a.lower == b.lower && a.start == b.start && a.group == b.group && a.row == b.row;
+}
+
 } // namespace
 
 TreeReport make_tree(const CscPattern& pattern, int branches) {
@@ -254,6 +260,26 @@ TreeReport make_tree(const CscPattern& pattern, int branches) {
   builder.cut(branches);
   builder.lay_updates();
   return report;
+}
+
+std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int branches) {
+  struct Known {
+    CscPattern pattern;
+    int branches;
+    TreeReport report;
+  };
+  static std::mutex mutex;
+  static std::array<std::weak_ptr<const Known>, 4> known; // the newest
+  static std::size_t oldest = 0;
+  const std::lock_guard<std::mutex> lock(mutex);
+  for (const std::weak_ptr<const Known>& one : known) {
+    const std::shared_ptr<const Known> k = one.lock();
+    if (k && k->branches == branches && same(k->pattern, pattern)) return {k, &k->report};
+  }
+  const auto fresh =
+      std::make_shared<const Known>(Known{pattern, branches, make_tree(pattern, branches)});
+  known[oldest++ % known.size()] = fresh;
+  return {fresh, &fresh->report};
 }
 
 } // namespace supple

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "supple/sparse.hpp"
@@ -63,5 +64,9 @@ struct TreeReport {
 /// @param branches how many independent subtrees to look for; 1 for none.
 /// @throws NumericalError out of memory, or a front of more than 2³² entries.
 TreeReport make_tree(const CscPattern& pattern, int branches);
+
+/// The same, or the one of a factor that lives and has the same pattern: a body's direct and
+/// inverse forms are analysed once.
+std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int branches);
 
 } // namespace supple

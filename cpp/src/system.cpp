@@ -39,6 +39,7 @@ void System::use_gmres(bool gmres) {
 void System::move_points(const ConstVector& points) {
   require_size("points", points.size(), static_cast<Index>(points_->size()), "three a node");
   *points_ = points;
+  inverse_.reset(); // it knows the loaded shape
 }
 
 void System::set_free(Mask free) {
