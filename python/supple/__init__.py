@@ -51,7 +51,7 @@ _HOME = {
     "reversed_gravity_error": "rest_check",
     "round_trip": "rest_check",
     "round_trip_error": "rest_check",
-    "sensitivity": "sensitivity",
+    "sensitivity": "sensitivities",
 }
 
 __all__ = [

@@ -202,3 +202,11 @@ def test_import_supple_loads_nothing_heavy() -> None:
     heavy = {"SimpleITK", "cma", "matplotlib", "meshio", "plotly", "scipy", "skimage", *GENERATOR}
     ours = {"supple._core", "supple.breast", "supple.cli"}
     assert not _fresh_import()[1] & (heavy | ours)
+
+
+def test_no_module_hides_a_public_name(root: Path) -> None:
+    """A module imported first would take the place of the function of its name."""
+    import supple
+
+    files = {path.stem for path in (root / "python" / "supple").iterdir()}
+    assert not files & set(supple.__all__)

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from ..body import Body, assemble
 from ..errors import ConvergenceError
 from ..mesh import Mesh
-from ..sensitivity import sensitivity
+from ..sensitivities import sensitivity
 from ..state import State
 
 Floats = npt.NDArray[np.float64]
