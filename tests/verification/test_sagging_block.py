@@ -31,13 +31,13 @@ def block():
 
 @pytest.mark.parametrize("parameters", sagging_block.PRINTED)
 def test_the_cube_comes_back_where_the_thesis_prints_its_error(block, parameters, shared):
-    """1e-10 m and below, against 1.21e-9 and 1.21e-5 m; the shortcut misses by far more."""
+    """1e-11 m and below, against 1.21e-9 and 1.21e-5 m; the shortcut misses by far more."""
     text = (shared / "reference/references.json").read_text(encoding="utf-8")
     printed = json.loads(text)["sagging_block"]["thesis_mae_m"].values()
     assert list(printed) == list(sagging_block.PRINTED.values())
     found = block.run(*parameters)
     assert found.outcome == SOLVED
-    assert found.mae <= found.largest < 1e-10
+    assert found.mae <= found.largest < 1e-11  # Newton's rtol is 1e-10 of the load
     assert found.reversed_gravity > 1e-5
 
 
