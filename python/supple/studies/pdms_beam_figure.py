@@ -84,4 +84,4 @@ def _numbers(axes: Any, outcome: Outcome) -> None:
     axes.set_yticks(range(len(rows)), [row[0] for row in rows], fontsize=8)
     axes.margins(x=0.3)
     axes.grid(axis="x", alpha=0.3)
-    axes.set(xlabel="|u| of the tip, mm", title="published (grey), beam theory, Supple (blue)")
+    axes.set(xlabel="|u| of the tip, mm", title="published, beam theory, Supple")
