@@ -52,6 +52,7 @@ def test_a_coarse_round_bar_hangs_as_the_elastica_and_comes_back_straight():
     assert pdms.straighten("round", body, state)[1].largest <= STRAIGHT_BAR
 
 
+@pytest.mark.slow
 def test_where_newton_starts_does_not_matter():
     """From the elastica's shape and from zero: the same equilibrium to 1e-9 m."""
     body, state = hung(round_bar(pdms.LENGTH, pdms.RADIUS, 2, 16, "Q2L"))

@@ -19,6 +19,7 @@ _STYLES = {
     ("P2", "displacement"): ("tab:green", "^", "P2"),
     ("P1", "displacement"): ("tab:brown", "v", "P1"),
 }
+_COLOURS = {"o": "tab:blue", "s": "tab:grey", "d": "black"}
 _AXES = {
     "elastica": ("k-", "elastica, round section"),
     "hanging": ("o", "hanging, Q2L–Q1"),
@@ -48,9 +49,11 @@ def _shapes(axes: Any, outcome: Outcome) -> None:
         axes.plot(x, y, style, ms=5, mfc="none", label=label)
     x, below = pdms.EXPERIMENT_TIP
     axes.plot(1e3 * x, -1e3 * below, "r*", ms=11, label="measured tip")
-    axes.set(xlabel="along the beam, mm", ylabel="height, mm", title="shape of the axis")
+    axes.set(
+        xlabel="along the beam, mm", ylabel="height, mm", title="shape of the axis", ylim=(-160, 55)
+    )
     axes.set_aspect("equal")
-    axes.legend(fontsize=8, loc="lower left")
+    axes.legend(fontsize=7, loc="lower left")
 
 
 def _curves(axes: Any, outcome: Outcome) -> None:
@@ -67,18 +70,18 @@ def _curves(axes: Any, outcome: Outcome) -> None:
 
 
 def _numbers(axes: Any, outcome: Outcome) -> None:
-    rows = [(name, value, "s") for name, value, _ in printed(outcome)]
+    rows = [(n, v, "d" if n.startswith("elastica") else "s") for n, v, _ in printed(outcome)]
     last = {t.element: t for t in outcome.tips if t.formulation == "mixed"}
     rows += [(f"Supple, round {name}", t.size, "o") for name, t in last.items()]
     if outcome.given:
         rows.append(("Supple, mesh given, largest", outcome.given.tip.largest, "o"))
     rows.sort(key=lambda row: row[1])
     for place, (_, value, marker) in enumerate(rows):
-        colour = "tab:blue" if marker == "o" else "tab:grey"
+        colour = _COLOURS[marker]
         axes.plot(1e3 * value, place, marker, color=colour)
         axes.annotate(f"{1e3 * value:.2f}", (1e3 * value, place), (6, -3),
                       textcoords="offset points", fontsize=8)  # fmt: skip
     axes.set_yticks(range(len(rows)), [row[0] for row in rows], fontsize=8)
-    axes.margins(x=0.2)
+    axes.margins(x=0.3)
     axes.grid(axis="x", alpha=0.3)
-    axes.set(xlabel="|u| of the tip, mm", title="published (grey) and computed (blue)")
+    axes.set(xlabel="|u| of the tip, mm", title="published, beam theory, Supple")

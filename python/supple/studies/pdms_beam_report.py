@@ -100,7 +100,7 @@ def printed(outcome: Outcome) -> list[tuple[str, float, str]]:
         ("FEniCS field on Beam2k", pdms.PUBLISHED_FIELD,
          f"largest |u| of all nodes, 963 kg/m³; {beam2k}"),
         ("FEniCS", pdms.FENICS,
-         "neither the round bar nor Beam2k.msh: a faceted section again, of a mesh that is not "
+         "between the round bar and Beam2k.msh, so most likely another faceted mesh, which is not "
          f"named; the elastica of regular polygons in the circle: {', '.join(corners)} corners"),
         ("Abaqus", pdms.ABAQUS,
          "as FEniCS', 0.2 mm away: the 0.14 mm between 963 and 965 kg/m³ would be most of it"),
