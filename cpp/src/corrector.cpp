@@ -7,6 +7,8 @@ namespace supple {
 
 namespace {
 
+constexpr double kStep = 1e-4;     // accuracy of a correction, where it is iterated
+constexpr double kTangent = 1e-6;  // and of the path's tangent
 constexpr double kChord = 0.1;    // fall of the residual with which a factor is kept
 constexpr double kRough = 1e-2;   // of the forces, taken where a kink of the law stops the fall
 constexpr double kShortest = 0.1; // of a correction
@@ -57,7 +59,7 @@ bool Corrector::correct(ArcPoint& point, double share) {
 
 /// One correction, shortened until it helps; the first may trade a stretch for a turn.
 bool Corrector::step(ArcPoint& point, Force& now) {
-  Vector d = p_.system.solve(-now.r);
+  Vector d = p_.system.solve(-now.r, kStep);
   const double ds = -dot(point.du, d) / (point.ds + dot(point.du, w_));
   d += ds * w_;
   if (!d.allFinite()) return false;
@@ -96,7 +98,7 @@ bool Corrector::factorise(const ArcPoint& point) {
   if (!status.ok() && !(indefinite && p_.system.factorise_indefinite().ok())) return false;
   Vector pull = p_.pull(point.u);
   if (p_.travel().cwiseAbs().maxCoeff() > 0.0) pull -= p_.system.apply(p_.travel());
-  w_ = p_.system.solve(pull) + p_.travel();
+  w_ = p_.system.solve(pull, kTangent) + p_.travel();
   return w_.allFinite();
 }
 
