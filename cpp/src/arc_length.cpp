@@ -43,7 +43,7 @@ ArcPoint between(const ArcPoint& a, const ArcPoint& b, double length, double t) 
 Outcome ArcLength::run() {
   here_.u = p_.result.u;
   here_.s = p_.result.load_factor;
-  if (!corrector_.begin(here_)) return Outcome::Singular;
+  if (!corrector_.begin(here_, step_.first())) return Outcome::Singular;
   length_ = kFirst / here_.ds;
   Outcome outcome = Outcome::Converged;
   while (fault_ == Outcome::Converged && corrector_.factors() < budget()) {

@@ -7,8 +7,9 @@ namespace supple {
 
 namespace {
 
-constexpr double kStep = 1e-4;     // accuracy of a correction, where it is iterated
-constexpr double kTangent = 1e-6;  // and of the path's tangent
+constexpr double kStep = 1e-4;    // accuracy of a correction, where it is iterated
+constexpr double kTangent = 1e-6; // and of the path's tangent
+constexpr double kGuess = 0.1;    // of the load, that a first tangent may miss
 constexpr double kChord = 0.1;    // fall of the residual with which a factor is kept
 constexpr double kRough = 1e-2;   // of the forces, taken where a kink of the law stops the fall
 constexpr double kShortest = 0.1; // of a correction
@@ -17,8 +18,15 @@ constexpr int kMost = 15;         // corrections of a point
 
 } // namespace
 
-bool Corrector::begin(ArcPoint& point) {
-  if (!factorise(point)) return false;
+bool Corrector::begin(ArcPoint& point, const Vector& w) {
+  bool good = w.size() > 0;
+  if (good) { // with the tangent under the whole load, whose follower forces have one of their own
+    p_.assemble_tangent(point.u, point.s);
+    const Vector pull = p_.pull(point.u);
+    good = p_.free_norm(p_.system.apply(w) - pull) <= kGuess * p_.free_norm(pull);
+  }
+  if (good) w_ = w;
+  if (!good && !factorise(point)) return false;
   unit_ = std::max(w_.squaredNorm(), 1e-300);
   point.du = Vector::Zero(w_.size());
   point.ds = 1.0;

@@ -18,7 +18,8 @@ class Corrector {
   explicit Corrector(Problem& problem) : p_(problem) {}
 
   /// The tangent where the path begins; from then on u and s weigh what they weigh in it.
-  bool begin(ArcPoint& point);
+  /// @param w a guess of du/ds there that saves a factor if it is good enough; may be empty.
+  bool begin(ArcPoint& point, const Vector& w);
   /// Bring a predicted point that has the tangent of the last one onto the path, with its own.
   /// @param share of the forces that may be missing.
   bool correct(ArcPoint& point, double share);

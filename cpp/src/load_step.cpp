@@ -57,6 +57,7 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     if (moves_supports) rhs -= p_.system.apply(d);
     d += p_.system.solve(rhs, forcing.next(norm, tol));
     if (!d.allFinite()) return Outcome::Singular;
+    if (first_.size() == 0) first_ = d;
     const double length = line_search(u, d, r, norm, s, manner, moves_supports);
     if (length == 0.0) return fault();
     u += length * d;

@@ -15,6 +15,9 @@ class LoadStep {
   /// Equilibrium at `s` from `u`, which is the last iterate if there is none.
   Outcome iterate(Vector& u, double s, Manner manner);
 
+  /// The first Newton step that was made (dofs), which is the way that the path sets out; or empty.
+  const Vector& first() const { return first_; }
+
  private:
   Outcome factorise(const Vector& u, double s, Manner manner);
   double line_search(const Vector& u, const Vector& d, const Vector& r, double norm, double s,
@@ -24,6 +27,7 @@ class LoadStep {
   Outcome fault() const;
 
   Problem& p_;
+  Vector first_;
   double shift_ = 0.0;
   bool indefinite_ = false;
 };
