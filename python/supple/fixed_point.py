@@ -199,7 +199,7 @@ def _search(
 
 def _worth(settings: newton.Settings, misses: list[float]) -> newton.Settings:
     """Tolerances a little below the miss that the next shot can be hoped to have."""
-    expected = 0.1 * misses[-1] if misses else 1e-2
+    expected = 0.1 * misses[-1] if misses else 0.0
     rtol = max(settings.rtol, min(0.1 * expected, 1e-3))
     return replace(settings, rtol=rtol, step_tol=max(settings.step_tol, expected))
 

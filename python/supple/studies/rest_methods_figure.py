@@ -55,7 +55,7 @@ def _bars(axes: Any, names: Sequence[str], values: dict[str, list[float]]) -> No
             transform=axes.get_xaxis_transform(),
         )  # fmt: skip
     axes.set_yscale("log")
-    axes.set_ylim(bottom=0.5 * np.nanmin(list(values.values())))
+    axes.set_ylim(bottom=min(0.8, 0.5 * np.nanmin(list(values.values()))))
     axes.set_xticks(places, names, fontsize=8)
     axes.grid(True, axis="y", which="both", alpha=0.25)
 
