@@ -7,8 +7,8 @@ namespace supple {
 
 namespace {
 
-constexpr double kStep = 1e-4;     // accuracy of a correction, where it is iterated
-constexpr double kTangent = 1e-6;  // and of the path's tangent
+constexpr double kStep = 1e-4;    // accuracy of a correction, where it is iterated
+constexpr double kTangent = 1e-6; // and of the path's tangent
 constexpr double kChord = 0.1;    // fall of the residual with which a factor is kept
 constexpr double kRough = 1e-2;   // of the forces, taken where a kink of the law stops the fall
 constexpr double kShortest = 0.1; // of a correction
