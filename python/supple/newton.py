@@ -20,6 +20,7 @@ Progress = Callable[[dict[str, float]], None]
 
 _FIELDS = ("load_factor", "iteration", "residual", "tolerance", "step", "length", "shift")
 
+
 @dataclass(frozen=True)
 class Settings:
     """How a body is solved; see `Body.solve`."""
