@@ -18,8 +18,9 @@ constexpr double kLost = 0.5;      // of a step: a correction that is not truste
 constexpr double kFoldTol = 4e-4;  // of the load, on the largest
 constexpr double kCollapse = 1e-2; // volume ratio of a cell that is taken for collapsed
 constexpr int kMostFactors = 300;  // before a fold
-constexpr int kAfterFold = 4;      // at least, to see whether the path comes back
-constexpr int kReturns = 2;        // to where a fault begins: a quarter of the step
+constexpr int kAfterFold = 3;      // at least, to see whether the path comes back
+constexpr int kReturns = 1;        // to where a fault begins: half of the step
+constexpr int kReturnsToStart = 6; // the same, where nothing was found yet
 constexpr double kNear = 0.05;     // of the load, to the whole of it where that has a fault
 
 /// Place in (0, 1) of the maximum of the cubic with values a, b and slopes p > 0 > q at 0 and 1.
@@ -131,7 +132,8 @@ void ArcLength::choose_length() {
 bool ArcLength::passes(const ArcPoint& next) {
   if (next.s <= p_.result.load_factor) return true; // on a way back, nothing to be kept
   const Outcome verdict = p_.judge(next.u, next.s);
-  if (verdict != Outcome::Converged && returns_++ == kReturns) fault_ = verdict;
+  const int most = p_.result.load_factor > 0.0 ? kReturns : kReturnsToStart;
+  if (verdict != Outcome::Converged && returns_++ >= most) fault_ = verdict;
   return verdict == Outcome::Converged;
 }
 

@@ -291,7 +291,8 @@ class Body:
                 from the mesh itself if None.
             load_steps, rtol, atol, max_iterations, progress: as in `solve`.
             solver: of the inverse's unsymmetric tangents: "gmres" on few symmetric factorisations,
-                LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres".
+                LU where it gets nowhere; "direct" is LU always; "auto" takes "gmres", and
+                "direct" for bodies with skins or sliding supports, whose forces have kinks.
             check_overlap: refuse a rest shape of which two parts are in one place
                 (`supple.overlap.overlapping`); one with cells inside out is always refused.
             **fixed_point_options: of the methods of "sellier": `fixed_point.FixedPoint`.

@@ -143,13 +143,12 @@ def seconds(attempt):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("inverse", [False, True])
 @pytest.mark.parametrize("share", [1.1, 2.0])
-def test_a_load_that_cannot_be_borne_fails_in_three_times_a_good_solve(share, inverse):
+def test_a_load_without_a_rest_shape_fails_in_three_times_a_good_search(share):
     """Against nine tenths of the largest, on a cube of 1,331 nodes, all built anew."""
     largest = tension(STRETCHES).max()
-    good = seconds(lambda: solve(cube(0.9 * largest, "neo_hookean", "P1", 10), inverse))
-    bad = seconds(lambda: solve(cube(share * largest, "neo_hookean", "P1", 10), inverse))
+    good = seconds(lambda: solve(cube(0.9 * largest, "neo_hookean", "P1", 10), True))
+    bad = seconds(lambda: solve(cube(share * largest, "neo_hookean", "P1", 10), True))
     assert bad <= 3 * good
 
 
