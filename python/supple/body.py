@@ -363,14 +363,15 @@ class Body:
         """Whether this body, loaded, would rest on the rest shape of the unknowns ``found``.
 
         One that any push leaves cannot have been seen in the given shape. Loads without an energy,
-        such as a pressure that follows, hide it.
+        which follow the facets, hide it.
         """
         outcome, n = core().Outcome, self._prescribed.size
         try:
             mesh = self.mesh.moved(self.mesh.points + found[:n].reshape(-1, 3))
         except MeshError:
             return outcome.inverted
-        if self._description.pressures:
+        d = self._description
+        if d.pressures or any(traction.per == "loaded" for traction in d.tractions):
             return outcome.converged
         built = self.on(mesh)._system()
         pressure = found[n:] * (scalar_unit / built.scalar_unit)

@@ -1,4 +1,4 @@
-"""Runs the runtime's Newton solver for a body; why it stopped, if it did, is told by failures.py."""
+"""Runs the runtime's Newton solver for a body; failures.py says in words why it stopped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Paths of equilibria past their limit points: one-dof closed forms, stability, time of failures."""
+"""Paths of equilibria past their limit points: closed forms of one unknown, stability, time."""
 
 from __future__ import annotations
 
