@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from .errors import ConvergenceError, InputError, MaterialError, MeshError, SuppleError
 
 if TYPE_CHECKING:
+    from .assembly import assemble as assemble
     from .author.curves import curves as curves
     from .author.fit import fit as fit
     from .body import Body as Body
-    from .body import assemble as assemble
     from .laws import Material as Material
     from .laws import material as material
     from .laws import materials as materials
@@ -42,7 +42,7 @@ _HOME = {
     "State": "state",
     "Surface": "surface",
     "Tag": "mesh",
-    "assemble": "body",
+    "assemble": "assembly",
     "curves": "author.curves",
     "fit": "author.fit",
     "material": "laws",

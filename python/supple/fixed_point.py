@@ -132,7 +132,7 @@ class Forward:
         return self._solve(body, settings, start)
 
     def _solve(self, body: Body, settings: newton.Settings, start: Floats | None) -> Shot:
-        result, built = body._run(settings, start)
+        result, built = newton.run(body, settings, start)
         for name in PHASES:
             self.timings[name] += getattr(built.system.timings, name)
         rows = [newton.as_dict(i) | {"solve": float(self.solves)} for i in result.history]
