@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from .rest_check import RoundTrip as RoundTrip
     from .rest_check import reversed_gravity_error as reversed_gravity_error
     from .rest_check import round_trip as round_trip
-    from .rest_check import round_trip_error as round_trip_error
     from .state import Rest as Rest
     from .state import State as State
     from .surface import Surface as Surface
@@ -50,7 +49,6 @@ _HOME = {
     "overlapping": "overlap",
     "reversed_gravity_error": "rest_check",
     "round_trip": "rest_check",
-    "round_trip_error": "rest_check",
     "sensitivity": "sensitivities",
 }
 

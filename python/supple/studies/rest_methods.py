@@ -23,7 +23,7 @@ from ..body import Body
 from ..errors import ConvergenceError
 from ..files import replacing
 from ..mesh import Mesh
-from ..rest_check import reversed_gravity_error, round_trip_error
+from ..rest_check import reversed_gravity_error, round_trip
 from ..state import Rest
 
 #: Newton iterations after which a method has failed.
@@ -183,12 +183,12 @@ def attempt(body: Body, **how: Any) -> Attempt:
     return Attempt(time.perf_counter() - begin, rest)
 
 
-def judged(body: Body, tried: Attempt) -> Attempt:
+def judged(tried: Attempt) -> Attempt:
     """The same, but no rest shape if the loaded shape is no stable equilibrium of it."""
     if tried.rest is None:
         return tried
     try:
-        miss = round_trip_error(body, tried.rest, near=True)
+        miss = round_trip(tried.rest, near=True).relative
     except ConvergenceError as failure:
         return Attempt(tried.seconds, None, f"found, but loaded again: {failure.cause}")
     why = f"found, but loaded again it misses by {miss:.1e}"
@@ -200,8 +200,7 @@ def limit(case: Case, method: str, progress: Callable[[str], None]) -> Limit:
 
     def reaches(factor: float) -> str | None:
         progress(f"{case.name}: {method} at {factor:.3g} g")
-        body = case.make(factor)
-        found = judged(body, attempt(body, **METHODS[method]))
+        found = judged(attempt(case.make(factor), **METHODS[method]))
         return None if found.rest is not None else found.why
 
     good, bad = 0.0, case.start
@@ -228,16 +227,15 @@ def race(case: Case, load: str, factor: float, progress: Callable[[str], None]) 
             finer = {"tolerance": RACE_TOLERANCE} if how else {}
             if not tries[name] or tries[name][-1].rest is not None:
                 tries[name].append(attempt(case.make(factor), rtol=RACE_RTOL, **how, **finer))
-    body = case.make(factor)
-    return [_racer(body, name, load, factor, tried) for name, tried in tries.items()]
+    return [_racer(name, load, factor, tried) for name, tried in tries.items()]
 
 
-def _racer(body: Body, name: str, load: str, factor: float, tried: list[Attempt]) -> Racer:
+def _racer(name: str, load: str, factor: float, tried: list[Attempt]) -> Racer:
     rest = tried[0].rest
     if rest is None:
         return Racer(name, load, factor, float("nan"), 0, 0, float("nan"))
     seconds = min(one.seconds for one in tried)
-    miss = round_trip_error(body, rest, near=True, rtol=RACE_RTOL)
+    miss = round_trip(rest, near=True, rtol=RACE_RTOL).relative
     return Racer(name, load, factor, seconds, rest.solves, rest.iterations, miss)
 
 
@@ -248,8 +246,7 @@ def run(case: Case, progress: Callable[[str], None] = lambda _: None) -> Outcome
     hard = HARD * min(outcome.limit(name) for name in METHODS if name.startswith("anderson"))
     for load, factor in (("easy", EASY * plain), ("hard", hard)):
         outcome.racers += race(case, load, factor, progress)
-        body = case.make(factor)
-        outcome.reversed_gravity[load] = reversed_gravity_error(body, body.rest_shape())
+        outcome.reversed_gravity[load] = reversed_gravity_error(case.make(factor).rest_shape())
     return outcome
 
 
