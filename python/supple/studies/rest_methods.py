@@ -25,6 +25,7 @@ from ..files import replacing
 from ..mesh import Mesh
 from ..rest_check import reversed_gravity_error, round_trip
 from ..state import Rest
+from . import published_meshes
 
 #: Newton iterations after which a method has failed.
 BUDGET = 300
@@ -143,13 +144,11 @@ def liver(mesh: Mesh, factor: float) -> Body:
 
 
 def cases(data: Path | None) -> list[Case]:
-    """Block and beam; with the folder of meshes ``data`` also the round beam and the liver."""
+    """Block and beam; with a folder of `published_meshes` also the round beam and the liver."""
     found = [Case("block", block), Case("beam", beam)]
     if data is None:
         return found
-    pdms = Mesh.read(data / "beam_pdms" / "Beam2k.msh", unit="m")
-    organ = Mesh.read(data / "liver_sofa" / "liver.msh", unit="m")
-    organ = Mesh(0.03 * organ.points, organ.cells, "P1")  # its unit is none; so it is 19 cm wide
+    pdms, organ = published_meshes.beam2k(data), published_meshes.liver(data)
     return [
         *found,
         Case("Beam2k.msh", lambda factor: round_beam(pdms, factor)),
