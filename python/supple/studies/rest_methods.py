@@ -10,7 +10,6 @@ about ten. Races are cold, in turn, best of three, to 1e-11 of the size.
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,7 +20,6 @@ import numpy as np
 
 from ..body import Body
 from ..errors import ConvergenceError
-from ..files import replacing
 from ..mesh import Mesh
 from ..rest_check import reversed_gravity_error, round_trip
 from ..state import Rest
@@ -247,65 +245,3 @@ def run(case: Case, progress: Callable[[str], None] = lambda _: None) -> Outcome
         outcome.racers += race(case, load, factor, progress)
         outcome.reversed_gravity[load] = reversed_gravity_error(case.make(factor).rest_shape())
     return outcome
-
-
-def beaten(outcome: Outcome) -> list[str]:
-    """Sentences for each way in which the inverse is not ahead; none if it is."""
-    inverse, doubts = outcome.limit("inverse"), []
-    for found in outcome.limits:
-        if found.method != "inverse" and found.good >= inverse:
-            doubts.append(f"{outcome.case}: {found.method} takes {found.good:.3g} g off, "
-                          f"inverse {inverse:.3g} g")  # fmt: skip
-    for load in outcome.reversed_gravity:
-        for name in RACERS:
-            if outcome.ratio(name, load) < 1:
-                doubts.append(f"{outcome.case}, {load} load: {name} is quicker than inverse")
-    return doubts
-
-
-def write(outcomes: list[Outcome], path: Path) -> Path:
-    """The table as CSV; lengths are shares of the size, loads multiples of gravity."""
-    with replacing(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
-        lines = [row(o, racer) for o in outcomes for racer in o.racers]
-        table = csv.DictWriter(file, list(lines[0]), lineterminator="\n")
-        table.writeheader()
-        table.writerows(lines)
-    return path
-
-
-def row(outcome: Outcome, racer: Racer) -> dict[str, Any]:
-    """One method on one body at one load."""
-    end = next((found for found in outcome.limits if found.method == racer.method), None)
-    return {
-        "body": outcome.case,
-        "method": racer.method,
-        "gravity_limit": "" if end is None else _short(end.good),
-        "fails_at": "" if end is None else _short(end.bad),
-        "why": "" if end is None else end.why,
-        "load": racer.load,
-        "gravity": _short(racer.factor),
-        "forward_solves": racer.solves,
-        "newton_iterations": racer.iterations,
-        "seconds": _short(racer.seconds),
-        "over_inverse": _short(outcome.ratio(racer.method, racer.load)),
-        "miss": _short(racer.miss),
-        "reversed_gravity_error": _short(outcome.reversed_gravity[racer.load]),
-    }
-
-
-def _short(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3g}"
-
-
-def lines(outcome: Outcome) -> list[str]:
-    """An outcome for people: limits, then times over the inverse's."""
-    limits = ", ".join(f"{found.method} {found.good:.3g} g" for found in outcome.limits)
-    told = [f"{outcome.case}: {limits}"]
-    for load, shortcut in outcome.reversed_gravity.items():
-        racers = [r for r in outcome.racers if r.load == load]
-        ratios = [f"{r.method} {_short(outcome.ratio(r.method, load)) or '–'}" for r in racers[1:]]
-        told.append(
-            f"  {racers[0].factor:.3g} g in {1e3 * racers[0].seconds:.0f} ms; times over that: "
-            f"{', '.join(ratios)}; reversed gravity is off by {shortcut:.2g} of the size"
-        )
-    return told
