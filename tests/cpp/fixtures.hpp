@@ -101,4 +101,10 @@ inline Eigen::MatrixXd restrict_dense(const Eigen::MatrixXd& full,
   return part;
 }
 
+inline Eigen::MatrixXd random_matrix(Eigen::Index rows, Eigen::Index columns, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); });
+}
+
 } // namespace fixtures
