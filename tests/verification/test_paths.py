@@ -11,6 +11,7 @@ import pytest
 import supple
 from supple import newton
 from supple.core import core
+from supple.rest_shape import Judge
 
 YOUNG, POISSON, STIFFENING = 1e3, 0.3, 0.02
 MU = YOUNG / (2 + 2 * POISSON)
@@ -19,7 +20,6 @@ STRETCHES = np.linspace(1, 4, 600001)
 
 LAW = f'''"""Neo-Hookean that stiffens with volume."""
 from supple.energy import Kinematics, Pa, Ratio, lame, ln
-from supple.rest_shape import Judge
 
 def psi(k: Kinematics, young: Pa = 1e3, poisson: Ratio = 0.3):
     mu, lmbda = lame(young, poisson)
