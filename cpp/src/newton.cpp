@@ -1,9 +1,9 @@
 #include "supple/newton.hpp"
 
 #include <algorithm>
-#include <chrono>
 
 #include "arc_length.hpp"
+#include "stopwatch.hpp"
 
 namespace supple {
 
@@ -74,12 +74,10 @@ class Path {
 
 NewtonResult solve(System& system, const Vector& start, const Vector& prescribed,
                    const NewtonSettings& settings, const Progress& progress) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch(system.timings.total);
   Problem problem(system, start, prescribed, settings, progress);
   problem.result.outcome = Path(problem).run();
   problem.result.residual = system.residual(problem.result.u, 1.0);
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-  system.timings.total += seconds.count();
   return std::move(problem.result);
 }
 

@@ -5,15 +5,14 @@
 #include <cmath>
 #include <Eigen/Dense>
 #include <memory>
-#include <new>
 #include <utility>
 #include <vector>
 
+#include "array.hpp"
 #include "linear_backend.hpp"
 #include "supernodal_dense.hpp"
 #include "supernodal_tree.hpp"
 #include "supple/blas.hpp"
-#include "supple/error.hpp"
 
 namespace supple {
 namespace {
@@ -28,28 +27,6 @@ constexpr int kBranches = 2; // shares for each thread: more of them leave more 
 std::size_t at(std::int64_t i) {
   return static_cast<std::size_t>(i);
 }
-
-/// Large arrays that need no first value, and whose pages are kept from one use to the next.
-class Array {
- public:
-  double* sized(std::int64_t size) {
-    if (size > size_) {
-      values_.reset();
-      values_.reset(new (std::nothrow) double[at(size)]);
-      size_ = 0;
-      if (!values_)
-        throw NumericalError(
-            "the factorisation ran out of memory; use a coarser mesh or a lower order");
-      size_ = size;
-    }
-    return values_.get();
-  }
-  double* get() const { return values_.get(); }
-
- private:
-  std::unique_ptr<double[]> values_;
-  std::int64_t size_ = 0;
-};
 
 class Supernodal final : public Backend {
  public:

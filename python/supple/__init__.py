@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from .errors import ConvergenceError, InputError, MaterialError, MeshError, SuppleError
 
 if TYPE_CHECKING:
+    from .assembly import assemble as assemble
     from .author.curves import curves as curves
     from .author.fit import fit as fit
     from .body import Body as Body
-    from .body import assemble as assemble
     from .laws import Material as Material
     from .laws import material as material
     from .laws import materials as materials
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from .rest_check import RoundTrip as RoundTrip
     from .rest_check import reversed_gravity_error as reversed_gravity_error
     from .rest_check import round_trip as round_trip
-    from .rest_check import round_trip_error as round_trip_error
     from .state import Rest as Rest
     from .state import State as State
     from .surface import Surface as Surface
@@ -42,7 +41,7 @@ _HOME = {
     "State": "state",
     "Surface": "surface",
     "Tag": "mesh",
-    "assemble": "body",
+    "assemble": "assembly",
     "curves": "author.curves",
     "fit": "author.fit",
     "material": "laws",
@@ -50,7 +49,6 @@ _HOME = {
     "overlapping": "overlap",
     "reversed_gravity_error": "rest_check",
     "round_trip": "rest_check",
-    "round_trip_error": "rest_check",
     "sensitivity": "sensitivities",
 }
 

@@ -10,21 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from . import assembly, failures, newton, parameters, rest_shape, supports, terms
 from . import body_checks as checks
-from . import failures, newton, parameters, rest_shape, supports, terms
 from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
 from .newton import Progress, Settings
-from .state import Equilibrium, Rest, State, outcome
+from .state import Rest, State, outcome
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
     from .mesh import Mesh
     from .surface import Surface
-
-Floats = npt.NDArray[np.float64]
 
 
 class Body:
@@ -254,7 +250,8 @@ class Body:
         if solver not in ("auto", "direct"):
             raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
-        result, built = self._run(settings, None if start is None else self._start(start))
+        begin = None if start is None else assembly.unknowns_of(self, start)
+        result, built = newton.run(self, settings, begin)
         failures.require_converged(result, built, self._description)
         solved = terms.snapshot(self._description)
         return State(
@@ -344,148 +341,6 @@ class Body:
         body._prescribed = -body._prescribed
         return body
 
-    def _run(
-        self,
-        settings: Settings,
-        start: Floats | None = None,
-        inverse: bool = False,
-        density_of: str = "rest",
-        gmres: bool = False,
-        judge: newton.Judge | None = None,
-    ) -> tuple[Any, terms.Built]:
-        native = settings.checked(self._rounding(), self.mesh)
-        if start is None and self._is_stressed():
-            start = self._unloaded(settings, inverse)
-        native.warm = start is not None
-        native.kinks = bool(self._description.skins or self._description.slides)
-        supports.require_held(self.mesh, self._fixed, self._normals())
-        built = self._system(inverse, density_of)
-        laws = {r.law.name: r.law for r in self._description.regions if len(r.ids)}
-        barriers = [law for law in laws.values() if "barrier" in law.exceptions]
-        native.refuse_inversion = inverse or len(barriers) < len(laws)
-        scalars = np.zeros(built.system.scalars)
-        built.system.set_free(np.append(~self._fixed.ravel(), scalars == 0))
-        built.system.use_gmres(gmres)
-        built.system.reset_timings()
-        target = np.append(-self._prescribed if inverse else self._prescribed, scalars)
-        if start is None:
-            start = np.zeros_like(target)
-        else:
-            start[self._prescribed.size :] /= built.scalar_unit
-        return newton.solve(built.system, start, target, native, settings, judge), built
-
-    def _is_stressed(self) -> bool:
-        """Whether a law is under stress at rest, so that no load is no equilibrium at u = 0."""
-        return any("stress_free" in r.law.exceptions for r in self._description.regions)
-
-    def _unloaded(self, settings: Settings, inverse: bool) -> Floats | None:
-        """Unknowns in equilibrium without loads, where the way to the load begins; None if lost."""
-        body = self.on(self.mesh).clear_loads()
-        start = unknowns(body, np.zeros_like(self.mesh.points))
-        result, built = body._run(replace(settings, progress=None), start, inverse)
-        if result.outcome.name != "converged":
-            return None
-        found = np.array(result.u)
-        found[self._prescribed.size :] *= built.scalar_unit
-        return found
-
-    def _unstable_directions(self, u: Floats) -> int:
-        """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
-        if self._description.pressures:  # which have none: nothing needs to be built
-            return 0
-        system = self._system().system
-        if not system.has_energy():
-            return 0
-        system.set_free(np.append(~self._fixed.ravel(), np.ones(system.scalars, bool)))
-        return int(system.unstable_directions(u))
-
-    def _system(self, inverse: bool = False, density_of: str = "rest") -> terms.Built:
-        key = (inverse, density_of if inverse else "rest")
-        if key not in self._built:
-            self._built[key] = terms.build(self._description, *key)
-        terms.refresh(self._built[key], self._description)
-        return self._built[key]
-
     def _restructured(self) -> Body:
         self._built.clear()
         return self
-
-    def _rounding(self) -> float:
-        """Size of the rounding errors in the internal forces, N: moduli × area, springs × place."""
-        total = 1e-14 * terms.modulus(self._description) * self.mesh.size**2
-        for slide in self._description.slides:
-            place = max(np.abs(self.mesh.points).max(), np.abs(slide.surface.points).max())
-            total += 2e-15 * float(np.linalg.norm(slide.stiffness)) * float(place)
-        return total
-
-    def _normals(self) -> dict[int, Floats]:
-        normals: dict[int, Floats] = {}
-        for slide in self._description.slides:
-            landed = slide.surface.closest(self.mesh.points[slide.nodes])
-            normals |= dict(zip(slide.nodes.tolist(), landed.normal, strict=True))
-        return normals
-
-    def _start(self, start: Equilibrium) -> Floats:
-        if start.u.shape != self._prescribed.shape:
-            raise InputError(
-                f"start must be a state of this mesh with {len(self.mesh.points)} nodes, "
-                f"got one with {len(start.u)}."
-            )
-        mixed = self._description.formulation == "mixed"  # another formulation's state may start it
-        return unknowns(self, start.u, start.pressure if mixed else None)
-
-
-def unknowns(body: Body, u: npt.ArrayLike, pressure: npt.ArrayLike | None = None) -> Floats:
-    """``u`` (n, 3) m, node-major, then in a mixed formulation ``pressure`` (n,) Pa at the corners.
-
-    Raises:
-        InputError: another shape, or a pressure where there is none.
-    """
-    moved, nodes = np.asarray(u, dtype=float), terms.pressure_nodes(body._description)
-    if moved.shape != body.mesh.points.shape:
-        raise InputError(f"u must have shape {body.mesh.points.shape}, got {moved.shape}.")
-    if pressure is None:
-        return np.append(moved, np.zeros(len(nodes)))
-    p = np.asarray(pressure, dtype=float)
-    if not len(nodes):
-        raise InputError(
-            f"pressure must be None in formulation {body._description.formulation!r}, which has "
-            'none of its own; leave it out or make the body with formulation "mixed".'
-        )
-    if p.shape != (len(moved),):
-        raise InputError(
-            f"pressure must have shape ({len(moved)},), one a node, got {p.shape}; "
-            "nodes that are no corners may hold any number."
-        )
-    return np.append(moved, p[nodes])
-
-
-def assemble(
-    body: Body, u: npt.ArrayLike, pressure: npt.ArrayLike | None = None
-) -> tuple[float, Floats, csr_array]:
-    """Energy, residual and tangent of a body at ``u`` (n, 3) m, all dofs, before elimination.
-
-    Args:
-        pressure: (n,) Pa, of a mixed formulation, which reads it at the corners; else None.
-
-    Returns:
-        energy (J; NaN where a load has none), residual (n, 3) N, internal minus external, and
-        tangent (3n, 3n) N/m as csr; dofs are node-major: x, y, z of node 0 first. In a mixed
-        formulation the residual is flat, (3n + c,), its last c entries (m³) and the tangent's last
-        c rows and columns those of the corners' pressures in the order of their nodes.
-
-    Raises:
-        InputError: ``u`` or ``pressure`` has another shape.
-    """
-    from scipy.sparse import csr_array, diags_array
-
-    flat, built = unknowns(body, u, pressure), body._system()
-    system, n = built.system, body.mesh.points.size
-    flat[n:] /= built.scalar_unit
-    energy = system.energy(flat, 1.0) if system.has_energy() else float("nan")
-    residual = system.residual(flat, 1.0)
-    tangent = csr_array(system.tangent(flat), shape=(flat.size, flat.size))
-    if flat.size == n:
-        return energy, residual.reshape(-1, 3), tangent
-    unit = np.append(np.ones(n), np.full(flat.size - n, 1 / built.scalar_unit))
-    return energy, unit * residual, csr_array(diags_array(unit) @ tangent @ diags_array(unit))

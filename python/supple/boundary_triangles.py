@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from supple.kernels.cells import Element
-from supple.mesh_topology import by_kind
+from .kernels.cells import Element
+from .mesh_topology import by_kind
 
+Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 #: Triangles (t, 3) of each kind of facet; nodes in VTK order: corners, middles of edges, middle.
@@ -33,3 +34,11 @@ def triangles_of(facets: Ints, element: Element) -> tuple[Ints, Ints]:
         triangles.append(facets[own][:, split].reshape(-1, 3))
         rows.append(np.repeat(own, len(split)))
     return np.concatenate(triangles), np.concatenate(rows)
+
+
+def unit_normals(corners: Floats) -> Floats:
+    """Normals (t, 3) at length 1 of triangles (t, 3, 3), 0 without an area."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.asarray(normal / np.maximum(size, np.finfo(float).tiny))

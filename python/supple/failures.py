@@ -25,10 +25,10 @@ _CAUSES = {
     "stalled": "the path of equilibria is lost before the whole load is on",
 }
 _CAUSES_INVERSE = {
-    "unstable": "no rest shape that would bear the load: the given shape is unstable on it",
-    "inverted": "no rest shape: a cell collapses on the way to it (too soft for this load)",
-    "limit_point": "no rest shape: the way to it ends at a limit point (too soft for this load)",
-    "stalled": "no rest shape was found: the way to it ends before the whole load is off",
+    "unstable": "unstable: a push moves the given shape away from its place (too soft)",
+    "inverted": "a cell collapses before the whole load is off (too soft)",
+    "limit_point": "limit point: the path turns back before the whole load is off (too soft)",
+    "stalled": "the path is lost before the whole load is off",
 }
 
 
@@ -85,8 +85,8 @@ def require_usable(rest: Rest) -> None:
     except MeshError:
         cause, cells = _CAUSES_INVERSE["inverted"], inverted(rest)
         raise ConvergenceError(
-            f"{cause}: in the shape found cells {some(cells)} are inside out at their corners; "
-            "try a smaller load, a stiffer material, a skin or a finer mesh.",
+            f"no rest shape: {cause}; in the shape found cells {some(cells)} are inside out at "
+            "their corners; try a smaller load, a stiffer material, a skin or a finer mesh.",
             history=rest.history,
             cells=cells,
             load_factor=1.0,

@@ -132,7 +132,7 @@ class Forward:
         return self._solve(body, settings, start)
 
     def _solve(self, body: Body, settings: newton.Settings, start: Floats | None) -> Shot:
-        result, built = body._run(settings, start)
+        result, built = newton.run(body, settings, start)
         for name in PHASES:
             self.timings[name] += getattr(built.system.timings, name)
         rows = [newton.as_dict(i) | {"solve": float(self.solves)} for i in result.history]
@@ -228,28 +228,32 @@ def _shoot(
             failure = problem
         if last is not None and not near:
             trial = 0.5 * (trial + last.points)
-    cause = f"a forward solve of {method} fails"
-    raise _failure(cause, forward, failure) from failure
+    raise _failure(f"a forward solve of {method} fails", method, forward, failure) from failure
 
 
 def _require_hope(forward: Forward, misses: list[float], chosen: FixedPoint, method: str) -> None:
     """Refuse misses that grow, do not fall any more, or take too long."""
     best = int(np.argmin(misses))
     if misses[-1] > _GROWTH * misses[0]:
-        raise _failure(f"{method} diverges", forward)
+        raise _failure(f"{method} diverges", method, forward)
     if len(misses) - 1 - best >= _PATIENCE:
-        raise _failure(f"{method} stalls at a miss of {misses[best]:.2g} of the size", forward)
+        cause = f"{method} stalls at a miss of {misses[best]:.2g} of the size"
+        raise _failure(cause, method, forward)
     if len(misses) >= chosen.max_solves:
-        raise _failure(f"{method} has not converged in max_solves = {chosen.max_solves}", forward)
+        cause = f"{method} has not converged in max_solves = {chosen.max_solves}"
+        raise _failure(cause, method, forward)
 
 
-def _failure(cause: str, forward: Forward, inner: Exception | None = None) -> ConvergenceError:
+def _failure(
+    cause: str, method: str, forward: Forward, inner: Exception | None = None
+) -> ConvergenceError:
     """The error for ``cause``, with all that was tried."""
     because = "" if inner is None else f" ({str(inner).rstrip('.')})"
+    better = "" if method == "sellier-anderson" else ' or "sellier-anderson"'
     known = inner if isinstance(inner, ConvergenceError) else None
     return ConvergenceError(
         f"no rest shape was found: {cause} after {forward.solves} forward solves{because}; "
-        'try method="inverse", a smaller load, a smaller relaxation or "sellier-anderson".',
+        f'try method="inverse"{better}, a smaller load or a smaller relaxation.',
         history=forward.history,
         cells=() if known is None else known.cells,
         load_factor=known.load_factor if known is not None and forward.solves == 1 else 0.0,

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from . import assembly, supports, terms
 from .core import core
 from .errors import InputError
 
 if TYPE_CHECKING:
+    from .body import Body
     from .mesh import Mesh
 
 Floats = npt.NDArray[np.float64]
@@ -54,6 +56,50 @@ class Settings:
         return native
 
 
+def run(
+    body: Body,
+    settings: Settings,
+    start: Floats | None = None,
+    inverse: bool = False,
+    density_of: str = "rest",
+    gmres: bool = False,
+    judge: Judge | None = None,
+) -> tuple[Any, terms.Built]:
+    """What the runtime finds for a body under its loads, and the system that it was found with.
+
+    Args:
+        start: unknowns (`assembly.unknowns`), m and Pa; from zero if None.
+        inverse: take the mesh for the loaded shape.
+        density_of: of the inverse, as in `Body.rest_shape`.
+        gmres: solve the inverse's tangents so where that arrives.
+        judge: asked of every shape that the inverse is about to end at.
+
+    Raises:
+        InputError: nothing resists a rigid motion, or a setting makes no sense.
+    """
+    native = settings.checked(_rounding(body), body.mesh)
+    d, fixed = body._description, body._fixed
+    if start is None and _is_stressed(body):
+        start = _unloaded(body, settings, inverse)
+    native.warm = start is not None
+    native.kinks = bool(d.skins or d.slides)
+    supports.require_held(body.mesh, fixed, _normals(body))
+    built = assembly.system(body, inverse, density_of)
+    laws = {r.law.name: r.law for r in d.regions if len(r.ids)}
+    barriers = [law for law in laws.values() if "barrier" in law.exceptions]
+    native.refuse_inversion = inverse or len(barriers) < len(laws)
+    scalars = np.zeros(built.system.scalars)
+    built.system.set_free(np.append(~fixed.ravel(), scalars == 0))
+    built.system.use_gmres(gmres)
+    built.system.reset_timings()
+    target = np.append(-body._prescribed if inverse else body._prescribed, scalars)
+    if start is None:
+        start = np.zeros_like(target)
+    else:
+        start[fixed.size :] /= built.scalar_unit
+    return solve(built.system, start, target, native, settings, judge), built
+
+
 def solve(
     system: Any,
     start: Floats,
@@ -76,3 +122,50 @@ def solve(
 def as_dict(iteration: Any) -> dict[str, float]:
     """One iteration of the history."""
     return {name: getattr(iteration, name) for name in _FIELDS}
+
+
+def unstable_directions(body: Body, u: Floats) -> int:
+    """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
+    if body._description.pressures:  # which have none: nothing needs to be built
+        return 0
+    system = assembly.system(body).system
+    if not system.has_energy():
+        return 0
+    system.set_free(np.append(~body._fixed.ravel(), np.ones(system.scalars, bool)))
+    return int(system.unstable_directions(u))
+
+
+def _is_stressed(body: Body) -> bool:
+    """Whether a law is under stress at rest, so that no load is no equilibrium at u = 0."""
+    return any("stress_free" in r.law.exceptions for r in body._description.regions)
+
+
+def _unloaded(body: Body, settings: Settings, inverse: bool) -> Floats | None:
+    """Unknowns in equilibrium without loads, where the way to the load begins; None if lost."""
+    bare = body.on(body.mesh).clear_loads()
+    start = assembly.unknowns(bare, np.zeros_like(body.mesh.points))
+    result, built = run(bare, replace(settings, progress=None), start, inverse)
+    if result.outcome.name != "converged":
+        return None
+    found = np.array(result.u)
+    found[body._fixed.size :] *= built.scalar_unit
+    return found
+
+
+def _rounding(body: Body) -> float:
+    """Size of the rounding errors in the internal forces, N: moduli × area, springs × place."""
+    mesh, d = body.mesh, body._description
+    total = 1e-14 * terms.modulus(d) * mesh.size**2
+    for slide in d.slides:
+        place = max(np.abs(mesh.points).max(), np.abs(slide.surface.points).max())
+        total += 2e-15 * float(np.linalg.norm(slide.stiffness)) * float(place)
+    return total
+
+
+def _normals(body: Body) -> dict[int, Floats]:
+    """By node, the direction in which a sliding support holds it."""
+    normals: dict[int, Floats] = {}
+    for slide in body._description.slides:
+        landed = slide.surface.closest(body.mesh.points[slide.nodes])
+        normals |= dict(zip(slide.nodes.tolist(), landed.normal, strict=True))
+    return normals

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .boundary_triangles import triangles_of
+from .boundary_triangles import triangles_of, unit_normals
 from .box_pairs import meeting
 from .errors import ConvergenceError
 from .kernels.cells import NO_NODE
@@ -131,8 +131,7 @@ def _crossing(points: Floats, triangles: Ints, margin: float) -> Mask:
 def _pierces(ends: Floats, corners: Floats, margin: float) -> Mask:
     """Which segments (k, 2, 3) go through which triangles (k, 3, 3)."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    normal = unit_normals(corners)
     from_plane = np.einsum("kei,ki->ke", ends - a[:, None], normal)
     through = (from_plane.max(axis=1) > margin) & (from_plane.min(axis=1) < -margin)
     share = np.divide(from_plane[:, 0], from_plane[:, 0] - from_plane[:, 1],
@@ -146,10 +145,8 @@ def _pierces(ends: Floats, corners: Floats, margin: float) -> Mask:
 def _covered_twice(points: Floats, triangles: Ints, margin: float) -> Mask:
     """Triangles (t,) with a place just below them that the surface encloses more than once."""
     corners = points[triangles]
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
-    inside = np.einsum("pk,tkx->tpx", _PLACES, corners) - margin * normal[:, None]
+    below = margin * unit_normals(corners)[:, None]
+    inside = np.einsum("pk,tkx->tpx", _PLACES, corners) - below
     times = windings(points, triangles, inside.reshape(-1, 3)).reshape(len(triangles), -1)
     return np.asarray((times > 1).any(axis=1))
 

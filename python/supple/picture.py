@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .boundary_triangles import triangles_of
+from .boundary_triangles import triangles_of, unit_normals
 from .errors import InputError
 from .mesh import Mesh
 from .overlap import owners
@@ -174,8 +174,6 @@ def _colours(figure: Any, axes: Any, panel: Panel, triangles: Ints, rows: Ints) 
 
 def _shaded(points: Floats, triangles: Ints, colours: Floats) -> Floats:
     """The colours under a light from above and in front."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    normal = unit_normals(points[triangles])
     light = 0.72 + 0.28 * (normal @ (_LIGHT / np.linalg.norm(_LIGHT)))
     return np.column_stack([np.clip(colours[:, :3] * light[:, None], 0, 1), colours[:, 3]])

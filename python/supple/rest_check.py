@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import ConvergenceError
-from .fixed_point import Forward
-from .newton import Settings
 from .state import State
 
 if TYPE_CHECKING:
@@ -26,7 +24,7 @@ class RoundTrip:
     """A rest shape under its loads again.
 
     Attributes:
-        state: the forward solve on the rest shape, from zero.
+        state: the forward solve on the rest shape.
         distance: m, the largest of a node from where it was given.
         relative: the same over the size of the given shape.
         seconds: wall time of the forward solve.
@@ -42,63 +40,58 @@ class RoundTrip:
     given: str
 
 
-def round_trip(rest: Rest, **settings: Any) -> RoundTrip:
+def round_trip(rest: Rest, near: bool = False, **settings: Any) -> RoundTrip:
     """Solve the body at rest forward and measure how far it misses the shape that was given.
 
     Args:
         rest: as `Body.rest_shape` found it, by whatever method.
-        **settings: of `Body.solve`.
+        near: start at the given shape instead of from zero. A body may have several equilibria
+            under one load; this asks whether the given shape is one, and stable.
+        **settings: load_steps, rtol, atol, max_iterations, progress of `Body.solve`.
 
     Raises:
-        ConvergenceError: loading the rest shape from zero leads to no stable equilibrium.
+        ConvergenceError: the solve leads to no stable equilibrium.
     """
     again, begin = rest.body(), perf_counter()
-    state = again.solve(**settings)
+    state = again.solve(start=_as_given(rest) if near else None, **settings)
     seconds, distance = perf_counter() - begin, _distance(state, rest)
     relative = distance / rest.loaded.size
-    given = "reached" if relative <= CLOSES else _given(again, rest, state, settings)
+    if relative <= CLOSES:
+        given = "reached"
+    else:
+        given = "no equilibrium" if near else _given(again, rest, settings)
     return RoundTrip(state, distance, relative, seconds, given)
+
+
+def _as_given(rest: Rest) -> State:
+    """The given shape as a state of the body at rest, to start from."""
+    shared = {f.name: getattr(rest, f.name) for f in fields(State)}
+    return State(**shared | {"u": -rest.u})
 
 
 def _distance(state: State, rest: Rest) -> float:
     return float(np.linalg.norm(state.points - rest.loaded.points, axis=1).max())
 
 
-def _given(again: Body, rest: Rest, other: State, settings: dict[str, Any]) -> str:
+def _given(again: Body, rest: Rest, settings: dict[str, Any]) -> str:
     """What a solve that starts from the given shape says of it."""
-    start = replace(other, u=-rest.u, pressure=rest.pressure)
     try:
-        near = again.solve(start=start, **settings)
+        near = again.solve(start=_as_given(rest), **settings)
     except ConvergenceError as error:
         return "unstable" if "unstable" in error.cause else "no equilibrium"
     near_enough = _distance(near, rest) <= CLOSES * rest.loaded.size
     return "another equilibrium" if near_enough else "no equilibrium"
 
 
-def round_trip_error(body: Body, rest: Rest, near: bool = False, **settings: Any) -> float:
-    """Largest distance of a node from where it should be after a forward solve, as share of size.
-
-    Args:
-        body: the one whose `Body.rest_shape` gave ``rest``, on the loaded shape.
-        near: start the solve at the loaded shape instead of at rest. A body may have several
-            equilibria under one load; this asks whether the loaded shape is one, and stable.
-        **settings: load_steps, rtol, atol, max_iterations, progress of `Body.solve`.
-
-    Raises:
-        ConvergenceError: no equilibrium was found.
-    """
-    return Forward(body, rest.density_of).shoot(rest.points, Settings(**settings), near).miss
-
-
-def reversed_gravity_error(body: Body, rest: Rest) -> float:
+def reversed_gravity_error(rest: Rest) -> float:
     """Largest distance of a node between ``rest`` and the shortcut's rest shape, as share of size.
 
-    The shortcut reverses the loads on the loaded shape (Mazier 2022, chapter 5). NaN where they
-    have no equilibrium then.
+    The shortcut reverses the loads on the loaded shape (Mazier 2022, chapter 5), here with the
+    laws' directions at rest. NaN where the loads have no equilibrium then.
     """
     try:
-        rough = body.rest_shape(method="reversed-gravity", density_of=rest.density_of)
+        rough = rest._body.rest_shape(method="reversed-gravity", density_of=rest.density_of)
     except ConvergenceError:
         return float("nan")
     away = np.linalg.norm(rough.points - rest.points, axis=1)
-    return float(away.max() / body.mesh.size)
+    return float(away.max() / rest.loaded.size)

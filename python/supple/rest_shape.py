@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import directions, failures, fixed_point, overlap, terms
+from . import assembly, directions, failures, fixed_point, newton, overlap, terms
 from .choices import FIXED_POINTS, METHODS, SOLVERS, STATES
 from .core import core
 from .errors import InputError
 from .mesh_jacobian import smallest_jacobian
-from .newton import Settings
 from .state import Rest, outcome
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ class Request:
     directions_of: str
     solver: str
     check_overlap: bool
-    settings: Settings
+    settings: newton.Settings
     options: dict[str, Any] = field(default_factory=dict)  # of a fixed point
 
     def __post_init__(self) -> None:
@@ -80,14 +79,16 @@ def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
 
 def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
     """By one solve: of the inverse form, or with the loads reversed."""
-    begin = None if start is None else body._start(start)
+    begin = None if start is None else assembly.unknowns_of(body, start)
     if asked.method == "inverse":
         d = body._description
         kinks = bool(d.skins or d.slides)  # at which inexact steps lose the way
         gmres = asked.solver == "gmres" or (asked.solver == "auto" and not kinks)
-        result, built = body._run(asked.settings, begin, True, asked.density_of, gmres, Judge(body))
+        result, built = newton.run(
+            body, asked.settings, begin, True, asked.density_of, gmres, Judge(body)
+        )
     else:
-        result, built = body._reversed()._run(asked.settings, begin)
+        result, built = newton.run(body._reversed(), asked.settings, begin)
     failures.require_converged(result, built, body._description, inverse=True)
     return Rest(
         **outcome(result, built, body._description, body._fixed),
@@ -118,10 +119,11 @@ class Judge:
         points = mesh.points + found[: mesh.points.size].reshape(-1, 3)
         if (smallest_jacobian(points, mesh.cells, mesh.table) <= 0).any():
             return outcome.inverted
-        self._body._system().system.move_points(points.ravel())
+        assembly.system(self._body).system.move_points(points.ravel())
         loaded = found.copy()
         loaded[: mesh.points.size] *= -1
-        return outcome.unstable if self._body._unstable_directions(loaded) else outcome.converged
+        unstable = newton.unstable_directions(self._body, loaded)
+        return outcome.unstable if unstable else outcome.converged
 
 
 def _require_one(name: str, value: str, choices: tuple[str, ...]) -> None:

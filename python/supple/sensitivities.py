@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import terms
-from .body import unknowns
+from .assembly import unknowns
 from .errors import InputError, MaterialError
 from .state import Equilibrium, Rest
 

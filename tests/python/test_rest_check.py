@@ -42,6 +42,22 @@ def test_what_the_given_shape_is_to_its_rest_shape(young, given):
     assert found.relative == missed / 0.06
     assert (found.relative < 1e-9) == (given == "reached")
     assert found.seconds > 0
+    near = supple.round_trip(rest, near=True)
+    assert near.given == "reached"
+    assert near.relative < 1e-9
+
+
+def test_a_failure_is_told_once():
+    """The message has its prefix once, and no method is advised that has just failed."""
+    body = cantilever(6e3)
+    for method in ("inverse", "sellier", "sellier-anderson"):
+        options = {} if method == "inverse" else {"max_solves": 2}
+        with pytest.raises(supple.ConvergenceError) as caught:
+            body.rest_shape(method=method, **options)
+        told = str(caught.value)
+        assert told.count("no rest shape") == 1
+        assert caught.value.cause in told
+        assert f'"{method}"' not in told
 
 
 def test_a_rest_shape_on_which_the_given_one_would_buckle_is_refused():
@@ -54,7 +70,8 @@ def test_a_rest_shape_on_which_the_given_one_would_buckle_is_refused():
 def test_an_approximate_rest_shape_has_the_given_one_for_no_equilibrium():
     body = cantilever(3e4)
     rest = body.rest_shape(method="reversed-gravity")
-    assert supple.round_trip(rest).given == "no equilibrium"
+    for near in (False, True):
+        assert supple.round_trip(rest, near).given == "no equilibrium"
     assert forces(body, rest)[0] > 1e-6
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import supple
 from supple.studies import rest_methods as study
 from supple.studies import rest_methods_figure
+from supple.studies import rest_methods_report as report
 
 
 def bar(stretch):
@@ -61,8 +63,7 @@ def outcome():
 
 
 def test_table_and_figure_hold_each_racer(outcome, tmp_path):
-    with study.write([outcome], tmp_path / "t.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = list(csv.DictReader(io.StringIO(report.table([outcome]))))
     assert [r["method"] for r in rows] == list(study.RACERS)
     assert rows[2]["over_inverse"] == "10"
     assert rows[1]["seconds"] == ""
@@ -70,11 +71,11 @@ def test_table_and_figure_hold_each_racer(outcome, tmp_path):
     for suffix in ("svg", "png"):
         path = rest_methods_figure.draw([outcome], tmp_path / f"f.{suffix}")
         assert path.stat().st_size > 5000
-    assert "inverse 3 g" in study.lines(outcome)[0]
+    assert "inverse 3 g" in report.lines(outcome)[0]
 
 
 def test_a_method_that_is_ahead_of_the_inverse_is_told(outcome):
-    assert study.beaten(outcome) == []
+    assert report.beaten(outcome) == []
     outcome.limits[3] = study.Limit("anderson", 3.5, 3.6, "diverges")
     outcome.racers[2] = study.Racer("aitken", "easy", 1.0, 0.005, 9, 20, 1e-13)
-    assert len(study.beaten(outcome)) == 2
+    assert len(report.beaten(outcome)) == 2

@@ -82,6 +82,7 @@ def test_every_verification_file_has_its_line() -> None:
 def test_equations_are_numbered_without_a_gap_and_references_lead_somewhere() -> None:
     numbers = [int(n) for n in re.findall(r"\\tag\{T(\d+)\}", text())]
     assert numbers == list(range(1, len(numbers) + 1))
+    assert text().count("$$") == 2 * len(numbers), "every formula on lines of its own has a number"
     assert {int(n) for n in re.findall(r"\(T(\d+)\)", text())} <= set(numbers)
     anchors = {re.sub(r"[^\w -]", "", title).lower().replace(" ", "-")
                for title in re.findall(r"^#+ (.*)$", text(), re.MULTILINE)}  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import supple
-from supple.body import unknowns
+from supple import assembly
 from supple.kernels.cells import ELEMENTS
 from supple.kernels.unit import FORMULATIONS, OFFERED, parse
 from supple.laws import folder, read_law
@@ -80,7 +80,7 @@ def make_case(unit, distorted, strain=1.0):
     body = supple.Body(mesh, law, formulation=formulation)
     spread = np.linspace(0.8, 1.25, len(mesh.cells))
     body.set(**{p.name: per_cell(p, spread) for p in LAWS[law].parameters})
-    built = body._system(form.endswith("inverse"))
+    built = assembly.system(body, form.endswith("inverse"))
     u = strain * stretched(mesh.points)
     rng = np.random.default_rng(5)
     x = np.append(u, 0.02 * rng.uniform(-1, 1, built.system.scalars))
@@ -202,12 +202,12 @@ def test_inverse_residual_is_the_direct_one_read_backwards(case, distorted):
     pressure = None
     if case.system.scalars:
         pressure = np.cos(3 * case.mesh.points[:, 0]) * 0.02 * case.built.scalar_unit
-    direct = case.body._system()
-    forward = unknowns(case.body, case.u, pressure)
+    direct = assembly.system(case.body)
+    forward = assembly.unknowns(case.body, case.u, pressure)
     forward[case.u.size :] /= direct.scalar_unit
     expected = direct.system.residual(forward, 1.0)
-    inverse = case.body.on(case.mesh.moved(case.mesh.points + case.u))._system(True)
-    backward = unknowns(case.body, -case.u, pressure)
+    inverse = assembly.system(case.body.on(case.mesh.moved(case.mesh.points + case.u)), True)
+    backward = assembly.unknowns(case.body, -case.u, pressure)
     backward[case.u.size :] /= inverse.scalar_unit
     found = inverse.system.residual(backward, 1.0)
     found[case.u.size :] *= direct.scalar_unit / inverse.scalar_unit
@@ -231,7 +231,7 @@ def test_turning_all_turns_the_forces_and_turning_the_body_alone_does_not(unit, 
         body = case.body.on(turned)
         if follow:
             body.set(**{name: values[name] @ rotation.T for name in fibres})
-        built = body._system()
+        built = assembly.system(body)
         scale = case.built.scalar_unit / built.scalar_unit  # of one and the same pressure
         found = built.system.residual(np.append(case.u @ rotation.T, scale * case.x[n:]), 1.0)
         found[n:] *= scale
@@ -267,8 +267,8 @@ def test_sensitivities_are_the_derivatives_of_the_residual(unit, distorted):
     )
 
     def residual(body):
-        built = body._system(not case.direct)
-        x = unknowns(body, case.u, nodal)
+        built = assembly.system(body, not case.direct)
+        x = assembly.unknowns(body, case.u, nodal)
         x[n:] /= built.scalar_unit
         r = built.system.residual(x, 1.0)
         r[n:] /= built.scalar_unit

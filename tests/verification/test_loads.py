@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import supple
+from supple import assembly
 from supple.kernels.cells import ELEMENTS
 
 A = np.array([[0.2, 0.1, -0.05], [0.0, -0.1, 0.1], [0.05, 0.0, 0.15]])
@@ -76,7 +77,7 @@ def test_tangent_of_a_load_that_moves_is_its_derivative(
         body.pressure(everywhere, 50.0)
     else:
         body.traction(everywhere, (10.0, -20.0, 30.0), per="rest" if inverse else "loaded")
-    system = body._system(inverse).system
+    system = assembly.system(body, inverse).system
     u = displaced(mesh.points).ravel()
     d = np.random.default_rng(2).uniform(-1, 1, u.size)
     K = csr_array(system.tangent(u), shape=(u.size, u.size))
@@ -93,7 +94,7 @@ def test_traction_sums_to_its_area(element, per):
     area = {"rest": 1.0, "loaded": facet_area(mesh, mesh.points + u)}[per]
     body = loads_only(mesh).traction(lambda p: p[:, 0] > 1 - 1e-9, t, per=per)
     np.testing.assert_allclose(-supple.assemble(body, u)[1].sum(axis=0), t * area, rtol=1e-10)
-    inverse = body.on(mesh.moved(mesh.points + u))._system(True).system
+    inverse = assembly.system(body.on(mesh.moved(mesh.points + u)), True).system
     force = -inverse.residual(-u.ravel(), 1.0).reshape(-1, 3)
     np.testing.assert_allclose(force.sum(axis=0), t * area, rtol=1e-10)
 
@@ -109,7 +110,7 @@ def test_weight_sums_to_the_mass(element, distorted):
     weight = {"rest": rho * mesh.volume * g, "loaded": rho * loaded.volume * g}
     np.testing.assert_allclose(-supple.assemble(body, u)[1].sum(axis=0), weight["rest"], rtol=1e-9)
     for density_of, expected in weight.items():
-        system = body.on(loaded)._system(True, density_of).system
+        system = assembly.system(body.on(loaded), True, density_of).system
         force = -system.residual(-u.ravel(), 1.0).reshape(-1, 3)
         np.testing.assert_allclose(force.sum(axis=0), expected, rtol=1e-9)
 
@@ -125,7 +126,7 @@ def test_everything_on_the_loaded_shape_is_the_direct_problem_read_backwards(ele
     body.force([0, 3], (1.0, 2.0, 3.0))
     u = displaced(rest.points)
     direct = supple.assemble(body, u)[1]
-    system = body.on(rest.moved(rest.points + u))._system(True).system
+    system = assembly.system(body.on(rest.moved(rest.points + u)), True).system
     inverse = system.residual(-u.ravel(), 1.0).reshape(-1, 3)
     np.testing.assert_allclose(inverse, direct, atol=1e-11 * abs(direct).max(), rtol=0)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import supple
+from supple import assembly
 from supple.kernels.cells import ELEMENTS, FACETS
 
 YOUNG, THICKNESS = 6e3, 2e-3
@@ -54,7 +55,7 @@ def sheet(mesh):
 
 def skin_force(body, u):
     """Residual (n, 3) of the skin alone, N."""
-    parts = body._system().skins[0]
+    parts = assembly.system(body).skins[0]
     u = np.ascontiguousarray(u).ravel()
     return sum(part.term.residual(u) for part in parts).reshape(-1, 3)
 
@@ -66,7 +67,7 @@ def test_skin_force_is_the_derivative_of_its_energy(
 ):
     """In the middle of each of the three regimes."""
     mesh = mesh_of(unit, distorted)
-    system = with_skin(mesh, unit.split(".")[0])._system().system
+    system = assembly.system(with_skin(mesh, unit.split(".")[0])).system
     u = moved(mesh.points, STATES[state])
     d = np.random.default_rng(2).uniform(-1, 1, u.size)
     assert_slope(lambda x: system.energy(x, 1.0), system.residual(u, 1.0) @ d, u, d, 2e-3)
@@ -83,7 +84,7 @@ def test_skin_tangent_is_the_derivative_of_its_force(
     law, _, form = unit.split(".")
     mesh = mesh_of(unit, distorted)
     inverse = form == "skin_inverse"
-    system = with_skin(mesh, law)._system(inverse).system
+    system = assembly.system(with_skin(mesh, law), inverse).system
     stretches = np.array(STATES[state])
     u = moved(mesh.points, 1 / stretches if inverse else stretches)
     d = np.random.default_rng(2).uniform(-1, 1, u.size)

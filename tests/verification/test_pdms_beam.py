@@ -10,6 +10,7 @@ import pytest
 from supple import InputError, Mesh
 from supple.cli import main
 from supple.studies import pdms_beam as pdms
+from supple.studies import published_meshes
 from supple.studies.elastica import bend
 from supple.studies.pdms_beam_report import ROUND_BAR, STRAIGHT_BAR, checks, lines, table
 from supple.studies.round_bar import round_bar, sections
@@ -17,7 +18,7 @@ from supple.studies.round_bar import round_bar, sections
 
 @pytest.fixture(scope="module")
 def beam2k(shared) -> Mesh:
-    return Mesh.read(shared / "data" / "beam_pdms" / "Beam2k.msh", unit="m")
+    return published_meshes.beam2k(shared / "data")
 
 
 def hung(mesh: Mesh, formulation: str = "mixed", **values: float):
@@ -90,12 +91,13 @@ def test_the_mesh_of_the_thesis_has_the_sections_that_were_measured(beam2k):
 
 
 def test_another_mesh_or_study_is_refused(tmp_path):
-    """A box of 1 m is no beam of 182 mm; --mesh is an option of this study alone (exit 2)."""
+    """A box of 1 m is no beam of 182 mm; other studies take no --data, no folder without it (2)."""
     with pytest.raises(InputError, match=r"0\.182 m"):
         pdms.given(Mesh.box((1, 1, 1), (1.0, 1.0, 1.0)))
     out = str(tmp_path / "out")
-    assert main(["study", "hanging-dome", "--mesh", "beam.msh", "--out", out]) == 2
-    assert main(["study", "pdms-beam", "--mesh", "none.msh", "--out", out]) == 2
+    folder = str(tmp_path)
+    assert main(["study", "hanging-dome", "--data", folder, "--out", out]) == 2
+    assert main(["study", "pdms-beam", "--data", folder, "--out", out]) == 2
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import supple
-from supple.body import unknowns
+from supple import assembly
 from supple.kernels.cells import ELEMENTS
 from supple.state import Rest, State
 
@@ -51,7 +51,7 @@ class Case:
         self.at = Rest(*solved, _body=self.body) if inverse else State(*solved)
 
     def residual(self, body):
-        flat, built = unknowns(body, self.u, self.p), body._system(self.inverse)
+        flat, built = assembly.unknowns(body, self.u, self.p), assembly.system(body, self.inverse)
         flat[self.u.size :] /= built.scalar_unit
         r = built.system.residual(flat, 1.0)
         r[self.u.size :] /= built.scalar_unit

@@ -23,6 +23,7 @@ from supple.breast.model import Materials, build_body, set_materials
 from supple.breast.poses import IMPATIENCE, Poses, solve_poses
 from supple.breast.skin_misfit import SkinMisfit, mean_absolute
 from supple.errors import ConvergenceError, InputError
+from supple.threads import one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -271,21 +272,7 @@ def _evaluator(
         yield lambda xs: [search(x) for x in xs]
         return
     with (
-        _one_thread(),
+        one_thread(),
         get_context("spawn").Pool(workers, _start_worker, (parts,)) as pool,  # ends them, always
     ):
         yield lambda xs: pool.map_async(_run_worker, xs, chunksize=1).get(TIMEOUT)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Processes that start inside use one OpenMP thread each."""
-    before = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = before

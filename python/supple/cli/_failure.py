@@ -70,4 +70,4 @@ def _draw(run: Run, error: ConvergenceError, mesh: Mesh, reached: Mesh) -> None:
     panels = [Panel(reached, f"{title};\nworst cells marked", marked=error.cells, ghost=mesh)]
     if error.points is not None:
         panels.insert(0, Panel(mesh, "as given,\nthe loaded shape"))
-    draw(run.path("failure.png"), panels, title=error.cause)
+    draw(run.path("failure.png"), panels, title=f"no rest shape: {error.cause}")

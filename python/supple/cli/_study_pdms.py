@@ -7,12 +7,12 @@ from pathlib import Path
 from ._run import Run
 
 
-def pdms_beam(run: Run, mesh: Path | None = None) -> None:
-    from ..mesh import Mesh
+def pdms_beam(run: Run, data: Path | None = None) -> None:
+    """The study of that name; with ``data`` also on the published mesh."""
     from ..studies import pdms_beam as study
-    from ..studies import pdms_beam_figure, pdms_beam_report
+    from ..studies import pdms_beam_figure, pdms_beam_report, published_meshes
 
-    given = None if mesh is None else Mesh.read(mesh, unit="m")
+    given = None if data is None else published_meshes.beam2k(data)
     outcome = study.run(given, progress=run.progress)
     run.path("pdms_beam.csv").write_text(pdms_beam_report.table(outcome), encoding="utf-8")
     for suffix in ("svg", "png"):

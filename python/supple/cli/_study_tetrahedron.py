@@ -13,6 +13,7 @@ def single_tetrahedron(run: Run, *, seed: int = 1) -> None:
     from ..studies import single_tetrahedron as single
     from ..studies import single_tetrahedron_figure as figure
     from ..studies import single_tetrahedron_run as methods
+    from ..studies.output import table
 
     if seed < 0:
         raise InputError(f"--seed must be at least 0, got {seed}.")
@@ -20,14 +21,14 @@ def single_tetrahedron(run: Run, *, seed: int = 1) -> None:
     samples = single.draw(seed)
     results = list(methods.run(samples, lambda share: run.progress("single-tetrahedron", share)))
     rows = methods.summary(results)
-    lines = methods.table([methods.line(result) for result in results])
+    lines = table([methods.line(result) for result in results])
     run.path("single_tetrahedron.csv").write_text(lines, encoding="utf-8")
-    run.path("single_tetrahedron_methods.csv").write_text(methods.table(rows), encoding="utf-8")
+    run.path("single_tetrahedron_methods.csv").write_text(table(rows), encoding="utf-8")
     for suffix in ("svg", "png"):
         figure.draw(results, run.path(f"single_tetrahedron.{suffix}"))
     run.result |= {"seed": seed, "tests": len(results), "methods": rows, "bar_m": methods.BAR}
     run.result |= {"thesis_sellier_failures": methods.THESIS_FAILURES}
-    run.say(methods.table(rows).strip())
+    run.say(table(rows).strip())
     _judge(run, rows[0], methods.BAR)
 
 

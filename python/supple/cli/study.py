@@ -64,8 +64,7 @@ _STUDIES: dict[str, Callable[..., None]] = {
 @click.option("--jobs", type=int, help="Processes; 0 (default): one a processor.")
 @click.option("--resume", is_flag=True, help="Go on with the samples that --out holds.")
 @click.option("--data", type=click.Path(path_type=Path, file_okay=False, exists=True),
-              help="Folder of beam_pdms/Beam2k.msh, liver_sofa/liver.msh.")  # fmt: skip
-@click.option("--mesh", type=click.Path(path_type=Path), help="pdms-beam: the thesis' Beam2k.msh.")
+              help="Folder of beam_pdms/Beam2k.msh and liver_sofa/liver.msh.")  # fmt: skip
 @click.option("--convergence", is_flag=True, help="Finer and finer meshes in place of samples.")
 def study(run: Run, name: str, **options: Any) -> None:
     r"""Run a study; writes its table and figure to --out (default: out/ and its name).
@@ -78,12 +77,11 @@ def study(run: Run, name: str, **options: Any) -> None:
                   displacement and strain for three laws and four elements; exits with 3 if
                   one is more than 0.1 off its theory
     pdms-beam     a silicone beam hanging to |u| = 129 mm at its tip, beside the elastica, and
-                  straight again; explains the published 127.68 to 134.8 mm; exits with 3 if a
-                  bar is missed (--mesh)
+                  straight again, with --data also on the thesis' own mesh; explains the
+                  published 127.68 to 134.8 mm; exits with 3 if a bar is missed
     rest-methods  the largest gravity that the inverse solve and the fixed points of forward
                   solves take off a block and a beam, with --data also off the PDMS beam's
                   mesh and a liver, and their times; exits with 3 if inverse is not ahead
-                  (--data)
     sagging-block a cube under its weight and back, for materials drawn at random: a line of
                   the table each, in parallel; stopped, it goes on with --resume; exits with 3
                   if a rest shape misses the cube by more than 1e-9 m (--samples, --seed,

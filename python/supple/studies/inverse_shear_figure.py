@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..files import replacing
 from .inverse_shear import LAWS, Outcome
 from .inverse_shear_table import BAR, ELEMENTS, rates, series
+from .output import save
 
 _COLOURS = dict(zip(LAWS, ("tab:blue", "tab:orange", "tab:green"), strict=True))
 
@@ -25,9 +25,7 @@ def draw(outcomes: Sequence[Outcome], path: Path) -> Path:
     _exact(exact, outcomes)
     _rates(slopes, series(outcomes))
     figure.suptitle("Inverse shear: the unit cube from its sheared shape and the loads on it")
-    with replacing(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], dpi=130)
-    return path
+    return save(figure, path)
 
 
 def _shapes(axes: Any) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..files import replacing
+from .output import save
 
 if TYPE_CHECKING:
     from .manufactured import Series
@@ -37,9 +37,7 @@ def draw(series: Sequence[Series], path: Path) -> Path:
     for axes in panels[-1]:
         axes.set_xlabel("cell size h, m")
     figure.suptitle("Manufactured solution on the unit cube, u = 1e-2 z (eˣ, eʸ, eᶻ) m")
-    with replacing(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], dpi=130)
-    return path
+    return save(figure, path)
 
 
 def _panel(axes: Any, series: Sequence[Series], name: str, number: int) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..files import replacing
 from . import pdms_beam as pdms
+from .output import save
 from .pdms_beam import Outcome
 from .pdms_beam_report import printed
 
@@ -38,9 +38,7 @@ def draw(outcome: Outcome, path: Path) -> Path:
     _curves(curves, outcome)
     _numbers(numbers, outcome)
     figure.suptitle("Silicone beam, 182 × 8.5 mm, under its own weight")
-    with replacing(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], dpi=130)
-    return path
+    return save(figure, path)
 
 
 def _shapes(axes: Any, outcome: Outcome) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -84,7 +84,7 @@ def printed(outcome: Outcome) -> list[tuple[str, float, str]]:
     fine, ways, theory = finest(outcome)[1], outcome.variants, bend(pdms.cantilever())
     soft = ways["bulk 1e7, as SOFA's"].size - ways["as the study"].size
     corners = [f"{1e3 * _polygon_tip(n):.2f} with {n}" for n in (12, 14, 16)]
-    beam2k = "give its mesh with --mesh to compute it" if outcome.given is None else (
+    beam2k = "give its mesh with --data to compute it" if outcome.given is None else (
         f"{1e3 * outcome.given.tip.largest:.2f} here; its axis {1e3 * outcome.given.tip.size:.2f}"
     )  # fmt: skip
     places = np.array(pdms.EXPERIMENT_TIP) - [pdms.LENGTH, 0.0]
@@ -131,7 +131,7 @@ def lines(outcome: Outcome) -> list[str]:
             f"{t.seconds:.1f} s" for t in outcome.tips]  # fmt: skip
     said += [f"round, {name}: |u| {1e3 * t.size:.2f}" for name, t in outcome.variants.items()]
     g = outcome.given
-    said += _given(g) if g else ["Beam2k.msh was not given (--mesh): round bars only."]
+    said += _given(g) if g else ["Beam2k.msh was not given (--data): round bars only."]
     inverses = [*outcome.inverses, *((g.back,) if g else ())]
     said += [f"{_inverse(i)}; {i.iterations} iterations, {i.seconds:.1f} s" for i in inverses]
     said += [f"{name}, {1e3 * value:.2f} mm: {why}." for name, value, why in printed(outcome)]
@@ -177,6 +177,6 @@ def result(outcome: Outcome) -> dict[str, Any]:
         "round_tip_m": finest(outcome)[1].size,
         "elastica_m": bend(pdms.cantilever()).displacement,
         "given_mesh": None if g is None else {"tip_m": g.tip.size, "largest_m": g.tip.largest},
-        "inverse": [vars(replace(i)) for i in outcome.inverses] + ([vars(g.back)] if g else []),
+        "inverse": [asdict(i) for i in (*outcome.inverses, *((g.back,) if g else ()))],
         "printed": {name: {"m": value, "why": why} for name, value, why in printed(outcome)},
     }

@@ -10,7 +10,6 @@ about ten. Races are cold, in turn, best of three, to 1e-11 of the size.
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,10 +20,10 @@ import numpy as np
 
 from ..body import Body
 from ..errors import ConvergenceError
-from ..files import replacing
 from ..mesh import Mesh
-from ..rest_check import reversed_gravity_error, round_trip_error
+from ..rest_check import reversed_gravity_error, round_trip
 from ..state import Rest
+from . import published_meshes
 
 #: Newton iterations after which a method has failed.
 BUDGET = 300
@@ -143,13 +142,11 @@ def liver(mesh: Mesh, factor: float) -> Body:
 
 
 def cases(data: Path | None) -> list[Case]:
-    """Block and beam; with the folder of meshes ``data`` also the round beam and the liver."""
+    """Block and beam; with a folder of `published_meshes` also the round beam and the liver."""
     found = [Case("block", block), Case("beam", beam)]
     if data is None:
         return found
-    pdms = Mesh.read(data / "beam_pdms" / "Beam2k.msh", unit="m")
-    organ = Mesh.read(data / "liver_sofa" / "liver.msh", unit="m")
-    organ = Mesh(0.03 * organ.points, organ.cells, "P1")  # its unit is none; so it is 19 cm wide
+    pdms, organ = published_meshes.beam2k(data), published_meshes.liver(data)
     return [
         *found,
         Case("Beam2k.msh", lambda factor: round_beam(pdms, factor)),
@@ -183,12 +180,12 @@ def attempt(body: Body, **how: Any) -> Attempt:
     return Attempt(time.perf_counter() - begin, rest)
 
 
-def judged(body: Body, tried: Attempt) -> Attempt:
+def judged(tried: Attempt) -> Attempt:
     """The same, but no rest shape if the loaded shape is no stable equilibrium of it."""
     if tried.rest is None:
         return tried
     try:
-        miss = round_trip_error(body, tried.rest, near=True)
+        miss = round_trip(tried.rest, near=True).relative
     except ConvergenceError as failure:
         return Attempt(tried.seconds, None, f"found, but loaded again: {failure.cause}")
     why = f"found, but loaded again it misses by {miss:.1e}"
@@ -200,8 +197,7 @@ def limit(case: Case, method: str, progress: Callable[[str], None]) -> Limit:
 
     def reaches(factor: float) -> str | None:
         progress(f"{case.name}: {method} at {factor:.3g} g")
-        body = case.make(factor)
-        found = judged(body, attempt(body, **METHODS[method]))
+        found = judged(attempt(case.make(factor), **METHODS[method]))
         return None if found.rest is not None else found.why
 
     good, bad = 0.0, case.start
@@ -228,16 +224,15 @@ def race(case: Case, load: str, factor: float, progress: Callable[[str], None]) 
             finer = {"tolerance": RACE_TOLERANCE} if how else {}
             if not tries[name] or tries[name][-1].rest is not None:
                 tries[name].append(attempt(case.make(factor), rtol=RACE_RTOL, **how, **finer))
-    body = case.make(factor)
-    return [_racer(body, name, load, factor, tried) for name, tried in tries.items()]
+    return [_racer(name, load, factor, tried) for name, tried in tries.items()]
 
 
-def _racer(body: Body, name: str, load: str, factor: float, tried: list[Attempt]) -> Racer:
+def _racer(name: str, load: str, factor: float, tried: list[Attempt]) -> Racer:
     rest = tried[0].rest
     if rest is None:
         return Racer(name, load, factor, float("nan"), 0, 0, float("nan"))
     seconds = min(one.seconds for one in tried)
-    miss = round_trip_error(body, rest, near=True, rtol=RACE_RTOL)
+    miss = round_trip(rest, near=True, rtol=RACE_RTOL).relative
     return Racer(name, load, factor, seconds, rest.solves, rest.iterations, miss)
 
 
@@ -248,68 +243,5 @@ def run(case: Case, progress: Callable[[str], None] = lambda _: None) -> Outcome
     hard = HARD * min(outcome.limit(name) for name in METHODS if name.startswith("anderson"))
     for load, factor in (("easy", EASY * plain), ("hard", hard)):
         outcome.racers += race(case, load, factor, progress)
-        body = case.make(factor)
-        outcome.reversed_gravity[load] = reversed_gravity_error(body, body.rest_shape())
+        outcome.reversed_gravity[load] = reversed_gravity_error(case.make(factor).rest_shape())
     return outcome
-
-
-def beaten(outcome: Outcome) -> list[str]:
-    """Sentences for each way in which the inverse is not ahead; none if it is."""
-    inverse, doubts = outcome.limit("inverse"), []
-    for found in outcome.limits:
-        if found.method != "inverse" and found.good >= inverse:
-            doubts.append(f"{outcome.case}: {found.method} takes {found.good:.3g} g off, "
-                          f"inverse {inverse:.3g} g")  # fmt: skip
-    for load in outcome.reversed_gravity:
-        for name in RACERS:
-            if outcome.ratio(name, load) < 1:
-                doubts.append(f"{outcome.case}, {load} load: {name} is quicker than inverse")
-    return doubts
-
-
-def write(outcomes: list[Outcome], path: Path) -> Path:
-    """The table as CSV; lengths are shares of the size, loads multiples of gravity."""
-    with replacing(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
-        lines = [row(o, racer) for o in outcomes for racer in o.racers]
-        table = csv.DictWriter(file, list(lines[0]), lineterminator="\n")
-        table.writeheader()
-        table.writerows(lines)
-    return path
-
-
-def row(outcome: Outcome, racer: Racer) -> dict[str, Any]:
-    """One method on one body at one load."""
-    end = next((found for found in outcome.limits if found.method == racer.method), None)
-    return {
-        "body": outcome.case,
-        "method": racer.method,
-        "gravity_limit": "" if end is None else _short(end.good),
-        "fails_at": "" if end is None else _short(end.bad),
-        "why": "" if end is None else end.why,
-        "load": racer.load,
-        "gravity": _short(racer.factor),
-        "forward_solves": racer.solves,
-        "newton_iterations": racer.iterations,
-        "seconds": _short(racer.seconds),
-        "over_inverse": _short(outcome.ratio(racer.method, racer.load)),
-        "miss": _short(racer.miss),
-        "reversed_gravity_error": _short(outcome.reversed_gravity[racer.load]),
-    }
-
-
-def _short(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3g}"
-
-
-def lines(outcome: Outcome) -> list[str]:
-    """An outcome for people: limits, then times over the inverse's."""
-    limits = ", ".join(f"{found.method} {found.good:.3g} g" for found in outcome.limits)
-    told = [f"{outcome.case}: {limits}"]
-    for load, shortcut in outcome.reversed_gravity.items():
-        racers = [r for r in outcome.racers if r.load == load]
-        ratios = [f"{r.method} {_short(outcome.ratio(r.method, load)) or '–'}" for r in racers[1:]]
-        told.append(
-            f"  {racers[0].factor:.3g} g in {1e3 * racers[0].seconds:.0f} ms; times over that: "
-            f"{', '.join(ratios)}; reversed gravity is off by {shortcut:.2g} of the size"
-        )
-    return told

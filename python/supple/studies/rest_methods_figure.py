@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..files import replacing
+from .output import save
 from .rest_methods import METHODS, RACERS
 
 if TYPE_CHECKING:
@@ -37,9 +37,7 @@ def draw(outcomes: Sequence[Outcome], path: Path) -> Path:
     right.set(ylabel="time over that of the inverse solve", title="Time (× : no rest shape found)")
     figure.legend(*_legend(left, right), loc="outside lower center", ncols=4, fontsize=9)
     figure.suptitle("Rest shapes: inverse solve against fixed points of forward solves")
-    with replacing(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], dpi=130)
-    return path
+    return save(figure, path)
 
 
 def _bars(axes: Any, names: Sequence[str], values: dict[str, list[float]]) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..files import replacing
 from . import sagging_block_convergence as convergence
 from .journal import Journal
+from .output import save
 from .sagging_block import BAR, LMBDA, MU, NO_FORWARD, PRINTED, SOLVED
 from .sagging_block_samples import column, outcomes
 
@@ -35,9 +35,7 @@ def draw(journal: Journal, printed: Mapping[tuple[float, float], float], path: P
         f"Sagging block, mixed P2–P1: {count} samples, largest MAE "
         f"{np.nanmax(column(journal, 'mae_m'), initial=0.0):.1e} m (bar {BAR:g} m)"
     )
-    with replacing(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], dpi=130)
-    return path
+    return save(figure, path)
 
 
 def _panel(figure: Any, axes: Any, journal: Journal, name: str, limits: Any, title: str) -> None:
@@ -97,6 +95,4 @@ def draw_convergence(rows: Sequence[convergence.Row], path: Path) -> Path:
     figure.suptitle(
         f"Sagging block, μ = {convergence.MU / 1e3:g} kPa, λ = {convergence.LMBDA / 1e6:g} MPa"
     )
-    with replacing(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], dpi=130)
-    return path
+    return save(figure, path)

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..body import Body, assemble
+from ..assembly import assemble
+from ..body import Body
 from ..errors import ConvergenceError
 from ..mesh import Mesh
 from ..sensitivities import sensitivity

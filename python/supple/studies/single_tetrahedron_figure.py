@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files import replacing
+from .output import save
 from .single_tetrahedron_run import BAR, MAX_SOLVES, THESIS, Result
 
 _STYLE = {
@@ -55,6 +55,4 @@ def draw(results: Sequence[Result], path: Path) -> Path:
         axes.set_xlabel("way of the free node / height of the tetrahedron")
         axes.grid(True, alpha=0.3)
     figure.suptitle(f"Single tetrahedron: {len(results)} loaded shapes taken back to rest")
-    with replacing(path) as aside:
-        figure.savefig(aside, format=path.suffix[1:], dpi=130)
-    return path
+    return save(figure, path)

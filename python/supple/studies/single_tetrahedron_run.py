@@ -7,8 +7,6 @@ Sellier's method runs as in the thesis: each forward solve from zero and to the 
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -136,17 +134,6 @@ def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
 
 def _mean(found: Sequence[Found], name: str) -> float:
     return float(np.mean([getattr(f, name) for f in found]))
-
-
-def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Rows as CSV, cells that a row lacks empty; floats to four digits."""
-    buffer = io.StringIO()
-    keys = list(dict.fromkeys(key for row in rows for key in row))
-    writer = csv.DictWriter(buffer, keys, lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
-    return buffer.getvalue()
 
 
 def line(result: Result) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from multiprocessing import get_context
 from typing import Any
 
 from ..errors import SuppleError
+from ..threads import one_thread
 
 
 def available() -> int:
@@ -42,7 +43,7 @@ def results(
     context = get_context("spawn")
     with ProcessPoolExecutor(min(jobs, len(tasks)), context, start) as pool:
         try:
-            with _one_thread(), _deaf():  # each submit starts a process until there are enough
+            with one_thread(), _deaf():  # each submit starts a process until there are enough
                 futures = [pool.submit(work, *task) for task in tasks[:jobs]]
             futures += [pool.submit(work, *task) for task in tasks[jobs:]]
             for future in as_completed(futures):
@@ -54,20 +55,6 @@ def results(
             ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Processes that start inside use one OpenMP thread each."""
-    before = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = before
 
 
 @contextmanager
