@@ -15,6 +15,7 @@ constexpr double kKinks = 3e-3;    // the same, where a law has kinks
 constexpr double kTight = 1e-6;    // of the forces, where the load is largest
 constexpr double kFar = 0.1;       // of a step: a correction after which the tangent is made anew
 constexpr double kLost = 0.5;      // of a step: a correction that is not trusted
+constexpr double kBent = 0.7;      // of a correction, that is left at half of a step on smooth ways
 constexpr double kFoldTol = 4e-4;  // of the load, on the largest
 constexpr double kCollapse = 1e-2; // volume ratio of a cell that is taken for collapsed
 constexpr int kMostFactors = 300;  // before a fold
@@ -111,11 +112,18 @@ bool ArcLength::arrive(ArcPoint& next) {
   const Vector u = next.u;
   const double s = next.s;
   if (!corrector_.correct(next, p_.settings.kinks ? kKinks : kLoose)) return false;
-  const double moved = corrector_.square(next.u - u, next.s - s);
-  const bool lost = moved > kLost * kLost * length_ * length_; // perhaps to another branch
-  if (lost && !p_.settings.kinks) return false;
-  const bool far = moved > kFar * kFar * length_ * length_;
+  const double moved = std::sqrt(corrector_.square(next.u - u, next.s - s)) / length_;
+  if (moved > kLost && !p_.settings.kinks && !kinked(moved)) return false; // another branch?
+  lost_ = 0.0;
+  const bool far = moved > kFar;
   return !(far || here_.ds * next.ds < 0.0) || corrector_.refresh(next);
+}
+
+/// Whether a correction this long, in steps, is a kink's: shorter steps would not make it shorter.
+bool ArcLength::kinked(double moved) {
+  const bool kink = lost_ > 0.0 && moved > kBent * lost_;
+  lost_ = moved;
+  return kink;
 }
 
 void ArcLength::choose_length() {

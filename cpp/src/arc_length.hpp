@@ -31,6 +31,7 @@ class ArcLength {
   bool finish(double length, Outcome& outcome);
   bool passes(const ArcPoint& next);
   bool arrive(ArcPoint& next);
+  bool kinked(double moved);
   void choose_length();
   void locate_fold(ArcPoint low, ArcPoint high, double length);
   ArcPoint predict(double length) const;
@@ -44,6 +45,7 @@ class ArcLength {
   ArcPoint here_, before_;
   double length_ = 0.0;    // of the next step
   double last_ = 0.0;      // of the last one, 0 at the start
+  double lost_ = 0.0;      // correction, in steps, for which the last one was refused
   double travelled_ = 0.0; // along the path
   int factors_at_fold_ = -1;
   Outcome at_end_; // what is wrong with the equilibrium under the whole load, if it was found

@@ -35,7 +35,8 @@ class Path {
     const bool descends = (p_.minimises || p_.settings.kinks) && verdict_ == Outcome::Converged;
     if (ends(outcome) && descends && !p_.settings.follow) outcome = reach(1.0, Manner::Guarded);
     if (ends(outcome)) outcome = ArcLength(p_, step_, verdict_).run();
-    return outcome == Outcome::Stalled && p_.minimises ? halved_steps() : outcome;
+    const bool lost = outcome == Outcome::Stalled || outcome == Outcome::Inverted;
+    return lost && p_.minimises ? halved_steps() : outcome;
   }
 
   /// From where the path was lost, along the energy: slow, but no stiffness is too uneven for it.
