@@ -56,13 +56,18 @@ def has_any(body: Body) -> bool:
 
 
 def rest_of_loaded(
-    body: Body, start: Rest | None, solve: Callable[[Body, Rest | None], Rest], mirrored: bool
+    body: Body,
+    start: Rest | None,
+    solve: Callable[[Body, Rest | None], Rest],
+    mirrored: bool,
+    rounding: float = ROUNDING,
 ) -> Rest:
     """The rest shape of a body whose directions are those of the loaded shape.
 
     Args:
         start: a rest shape to start from, with its directions.
         solve: rest shape of a body whose directions are those at rest.
+        rounding: turn, rad, below which `solve` is not exact enough to tell any more.
         mirrored: that `solve` takes the loaded shape for the one at rest, so that its directions
             are the ones given: nothing to repeat.
 
@@ -75,11 +80,15 @@ def rest_of_loaded(
     if mirrored:
         rest = solve(trial, start)
         return _with(rest, _pulled_back(rest, given, trial))
-    return _settled(trial, given, start, solve)
+    return _settled(trial, given, start, solve, rounding)
 
 
 def _settled(
-    trial: Body, given: Floats, start: Rest | None, solve: Callable[[Body, Rest | None], Rest]
+    trial: Body,
+    given: Floats,
+    start: Rest | None,
+    solve: Callable[[Body, Rest | None], Rest],
+    rounding: float,
 ) -> Rest:
     f, rest = given if start is None else _pulled_back(start, given, trial), start
     found: list[Rest] = []
@@ -92,7 +101,7 @@ def _settled(
         back = _pulled_back(rest, given, trial)
         turns.append(float(np.linalg.norm(back - f, axis=1).max()))
         falls = len(turns) < 2 or turns[-1] < 0.5 * turns[-2]
-        if turns[-1] <= SETTLED or (turns[-1] <= ROUNDING and not falls):
+        if turns[-1] <= SETTLED or (turns[-1] <= rounding and not falls):
             return _summed(rest, found)
         f = _unit(acceleration.step(f.ravel(), (back - f).ravel()).reshape(-1, 3))
     raise ConvergenceError(

@@ -30,12 +30,21 @@ _CAUSES_INVERSE = {
     "limit_point": "limit point: the path turns back before the whole load is off (too soft)",
     "stalled": "the path is lost before the whole load is off",
 }
+#: What there is not, by the method that was to find it.
+_WHAT = {
+    "": "no equilibrium",
+    "inverse": "no rest shape",
+    "reversed-gravity": "no equilibrium under reversed loads, which tells nothing of rest shapes",
+}
 
 
 def require_converged(
-    result: Any, built: Built, description: Description, inverse: bool = False
+    result: Any, built: Built, description: Description, method: str = ""
 ) -> None:
     """Raise for a result that is no stable equilibrium under the whole load.
+
+    Args:
+        method: that was to find a rest shape, "inverse" or "reversed-gravity"; else nothing.
 
     Raises:
         ConvergenceError: cause, load factor, worst cells, history, points.
@@ -43,6 +52,7 @@ def require_converged(
     name = result.outcome.name
     if name == "converged":
         return
+    inverse = method == "inverse"
     cause = (_CAUSES_INVERSE if inverse else {}).get(name, _CAUSES[name])
     u = result.u[: description.mesh.points.size].reshape(-1, 3)
     points = description.mesh.points + u
@@ -50,7 +60,7 @@ def require_converged(
     cells = pressed_cells(description.mesh, points) if pressed else None
     cells = cells or worst_cells(result, built, description)
     raise ConvergenceError(
-        f"no {'rest shape' if inverse else 'equilibrium'}: {cause}; "
+        f"{_WHAT[method]}: {cause}; "
         f"{100 * result.load_factor:.4g} % of the load was reached, "
         f"worst cells {cells[:3]}; {advice(name, result.load_factor)}.",
         history=[as_dict(i) for i in result.history],

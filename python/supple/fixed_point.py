@@ -54,6 +54,9 @@ class FixedPoint:
     exact: bool = False
 
     def __post_init__(self) -> None:
+        for name in ("depth", "max_solves"):
+            if not isinstance(getattr(self, name), int):
+                raise InputError(f"{name} must be a whole number, got {getattr(self, name)!r}.")
         for name in ("relaxation", "depth", "tolerance", "max_solves"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):

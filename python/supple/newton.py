@@ -44,6 +44,8 @@ class Settings:
         """
         if not 0 < self.rtol < 1:
             raise InputError(f"rtol must lie between 0 and 1, got {self.rtol}.")
+        if self.atol is not None and not 0 <= self.atol < np.inf:
+            raise InputError(f"atol must be at least 0 N and finite, or None, got {self.atol}.")
         if self.max_iterations < 1:
             raise InputError(f"max_iterations must be at least 1, got {self.max_iterations}.")
         if self.load_steps is not None and self.load_steps < 1:

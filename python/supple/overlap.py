@@ -9,6 +9,7 @@ so a place that is covered twice borders on a boundary facet whose inner side is
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,17 +85,20 @@ def _turns(corners: Ints) -> Mask:
     return np.asarray(after < before)
 
 
-def require_apart(rest: Rest) -> None:
+def require_apart(rest: Rest) -> Rest:
     """Refuse a rest shape that overlaps itself where the shape that was given does not.
+
+    Returns:
+        The rest shape; with a warning where the shape that was given overlaps itself.
 
     Raises:
         ConvergenceError: how many facets, of which cells.
     """
-    rows = overlapping(rest.mesh)
-    if len(rows):  # a mesh with cells turned over has been given so: that is not the rest shape's
-        rows = np.setdiff1d(rows, overlapping(rest.loaded))
+    rows = found = overlapping(rest.mesh)
+    if len(found):  # a mesh may have been given so: that is not the rest shape's
+        rows = np.setdiff1d(found, overlapping(rest.loaded))
     if not len(rows):
-        return
+        return _warned(rest, len(found)) if len(found) else rest
     cells, cause = np.unique(owners(rest.mesh)[rows]), "rest shape overlaps itself"
     raise ConvergenceError(
         f"no usable rest shape: the {cause} at {len(rows)} boundary facets of cells {some(cells)}; "
@@ -105,6 +109,14 @@ def require_apart(rest: Rest) -> None:
         cause=cause,
         points=rest.points,
     )
+
+
+def _warned(rest: Rest, facets: int) -> Rest:
+    warning = (
+        f"the given mesh overlaps itself, and so does the rest shape, at {facets} boundary facets; "
+        "its volume and weight count twice there."
+    )
+    return replace(rest, warnings=(*rest.warnings, warning))
 
 
 def _crossing(points: Floats, triangles: Ints, margin: float) -> Mask:

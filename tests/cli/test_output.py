@@ -67,3 +67,9 @@ def test_a_file_in_the_way_is_refused_at_once(tmp_path: Path, target: str) -> No
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(InputError, match=r"--out must name a folder, but .*taken is a file"):
         OutputFolder(tmp_path / target)
+
+
+def test_a_place_where_nothing_can_be_made_is_refused_at_once() -> None:
+    """Root may write anywhere by its rights; the kernel's own folders take no files even so."""
+    with pytest.raises(InputError, match=r"--out .* cannot be written"):
+        OutputFolder(Path("/proc/supple"))

@@ -185,7 +185,7 @@ def test_a_failure_leaves_where_it_ended_and_no_result(
 ) -> None:
     """One iteration is too few: failure.json, .vtu and .png, no file of a result, exit 3.
 
-    A good run in the same folder takes them away.
+    A good run in the same folder takes them away, and they take its files away.
     """
     command = ["rest-shape", "bar.vtu", *OPTIONS, "--out", "out"]
     assert main([*command, "--load-steps", "1", "--max-iterations", "1"]) == 3
@@ -205,6 +205,8 @@ def test_a_failure_leaves_where_it_ended_and_no_result(
     assert main(command) == 0
     written = {"loaded.vtu", "rest.vtu", "result.json"}
     assert {path.name for path in (folder / "out").iterdir()} == written
+    assert main([*command, "--load-steps", "1", "--max-iterations", "1"]) == 3
+    assert {path.name for path in (folder / "out").iterdir()} == names
 
 
 def test_a_rest_shape_in_itself_is_refused_and_drawn(folder: Path) -> None:

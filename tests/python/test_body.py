@@ -216,3 +216,19 @@ def test_a_rest_shape_starts_from_an_earlier_one():
     assert warm.iterations < cold.iterations
     with pytest.raises(supple.InputError, match="start must be a rest shape"):
         b.rest_shape(start=b.solve())
+
+
+@pytest.mark.parametrize("atol", [-1.0, float("nan"), float("inf")])
+def test_a_senseless_absolute_tolerance_is_refused(atol):
+    mesh = supple.Mesh.box((1, 1, 1), (1.0, 1.0, 1.0), "P1")
+    body = supple.Body(mesh, "neo_hookean").fix(lambda p: p[:, 2] < 1e-9)
+    with pytest.raises(supple.InputError, match="atol must be at least 0 N"):
+        body.solve(atol=atol)
+
+
+@pytest.mark.parametrize(("name", "value"), [("depth", 2.5), ("max_solves", "a")])
+def test_counts_of_a_fixed_point_are_whole_numbers(name, value):
+    mesh = supple.Mesh.box((1, 1, 1), (1.0, 1.0, 1.0), "P1")
+    body = supple.Body(mesh, "neo_hookean").fix(lambda p: p[:, 2] < 1e-9)
+    with pytest.raises(supple.InputError, match=f"{name} must be a whole number"):
+        body.rest_shape(method="sellier-anderson", **{name: value})

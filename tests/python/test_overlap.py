@@ -148,3 +148,15 @@ def test_a_cell_on_its_neighbours_side_is_named():
     turned = supple.Mesh(points, np.vstack([[cell], mesh.cells[1:]]), "P1")
     assert 0 in overlap.turned_over(turned)
     assert len(overlap.overlapping(turned))
+
+
+def test_a_mesh_given_in_itself_is_told_of_by_its_rest_shape():
+    """Two blocks pushed into each other, held apart from each other: no refusal, a warning."""
+    one = supple.Mesh.box((1, 1, 2), (0.02, 0.02, 0.04), "P1")
+    points = np.vstack([one.points, np.add(one.points, (0.005, 0.003, 0.001))])
+    mesh = supple.Mesh(points, np.vstack([one.cells, one.cells + len(one.points)]), "P1")
+    body = supple.Body(mesh, "neo_hookean", density=1000.0, young=3e3, poisson=0.3)
+    body.fix(lambda p: p[:, 2] > 0.0395).gravity((0.0, 0.0, -1.0))
+    assert not body.rest_shape().warnings
+    (warning,) = body.rest_shape(check_overlap=True).warnings
+    assert "given mesh overlaps itself" in warning

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from ..mesh import Mesh
     from ._run import Run
 
+#: What a good run leaves instead.
+RESULTS = ("result.json", "rest.vtu", "loaded.vtu")
 FILES = ("failure.json", "failure.png", "failure.vtu")
 
 
@@ -28,6 +30,7 @@ def leave(run: Run, error: ConvergenceError, mesh: Mesh) -> None:
     """Publish the files above, and nothing else that the run has written; ``mesh`` was given."""
     reached = mesh if error.points is None else mesh.placed(error.points)
     run.drop()
+    run.replaces(RESULTS)
     run.path("failure.json").write_text(dumps(_described(error, mesh)) + "\n", encoding="utf-8")
     rank = np.zeros(len(mesh.cells))
     rank[error.cells] = 1.0 + np.arange(len(error.cells))

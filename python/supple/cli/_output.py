@@ -29,7 +29,7 @@ class OutputFolder:
         """Where to write the file `name` (may hold a "/") until it is published."""
         if self._draft is None:
             prefix, place = f".{self.target.name}.", self._nearest_folder(self.target)
-            self._draft = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=place))
+            self._draft = self._made(prefix, place)
         file = self._draft / name
         file.parent.mkdir(parents=True, exist_ok=True)
         return file
@@ -70,6 +70,15 @@ class OutputFolder:
             raise InputError(
                 f"--out {self.target} cannot be written: {place} is read-only; choose another."
             )
+        self._made(f".{self.target.name}.", place).rmdir()  # before any long work
+
+    def _made(self, prefix: str, place: Path) -> Path:
+        try:
+            return Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=place))
+        except OSError as problem:
+            raise InputError(
+                f"--out {self.target} cannot be written: {problem.strerror}; choose another."
+            ) from None
 
     @staticmethod
     def _nearest_folder(path: Path) -> Path:

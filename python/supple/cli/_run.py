@@ -62,7 +62,7 @@ class Run:
         self._doubts.append(reason)
 
     def replaces(self, names: tuple[str, ...]) -> None:
-        """A good end removes these files of an earlier run from the output folder."""
+        """The files of this run take the place of these, an earlier one's, in the output folder."""
         self._obsolete = names
 
     def drop(self) -> None:
@@ -73,7 +73,7 @@ class Run:
     def keep(self) -> None:
         """The files written so far appear now, whatever comes: for what is left of a failure."""
         assert self._folder is not None, "a command that writes files calls out_or first"
-        names = self._folder.publish()
+        names = self._publish()
         click.echo(f"supple: where it ended: {self._folder.target}: {', '.join(names)}", err=True)
 
     @property
@@ -94,14 +94,19 @@ class Run:
             if self._folder is not None:
                 self._folder.discard()
 
+    def _publish(self) -> list[str]:
+        assert self._folder is not None
+        names = self._folder.publish()
+        for name in self._obsolete:
+            (self._folder.target / name).unlink(missing_ok=True)
+        return names
+
     def _finish(self) -> None:
         if self._doubts:
             self.result["not_trustworthy"] = self._doubts
         if self._folder is not None:
             self.path("result.json").write_text(dumps(self.result) + "\n", encoding="utf-8")
-            names = self._folder.publish()
-            for name in self._obsolete:
-                (self._folder.target / name).unlink(missing_ok=True)
+            names = self._publish()
             self.say(f"wrote {self._folder.target}: {', '.join(names)}")
         click.echo(dumps(self.result) if self._as_json else "\n".join(self._lines))
         for reason in self._doubts:

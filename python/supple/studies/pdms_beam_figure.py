@@ -43,6 +43,8 @@ def draw(outcome: Outcome, path: Path) -> Path:
 
 def _shapes(axes: Any, outcome: Outcome) -> None:
     for name, (style, label) in _AXES.items():
+        if name not in outcome.axes:  # it was not found
+            continue
         x, y = 1e3 * outcome.axes[name].T
         axes.plot(x, y, style, ms=5, mfc="none", label=label)
     x, below = pdms.EXPERIMENT_TIP

@@ -143,6 +143,8 @@ def _name(t: Tip) -> str:
 
 
 def _inverse(i: Inverse) -> str:
+    if np.isnan(i.largest):
+        return f"{i.section}, {i.method}: no equilibrium was found under the reversed load"
     return f"{i.section}, {i.method}: largest distance from the straight beam {i.largest:.1e} m"
 
 
