@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import assembly, failures, newton, parameters, rest_shape, supports, terms
+from . import assembly, failures, newton, parameters, supports, terms
 from . import body_checks as checks
 from .errors import InputError
 from .laws import read_law
@@ -236,7 +236,8 @@ class Body:
 
         Args:
             start: a state of this mesh to start from; from zero if None.
-            load_steps: equal steps; adaptive with cut-back if None.
+            load_steps: equal steps; if None the whole load at once, and where that fails along
+                the path of equilibria.
             rtol: of max(‖external force‖, ‖reactions‖); the last step is ≤ 1e-8 of the size too.
             atol: N; rounding of the stiffness if None.
             max_iterations: of each load step.
@@ -299,6 +300,8 @@ class Body:
             ConvergenceError: there is no such rest shape, or none was found, with the cause; or
                 the directions at rest do not settle.
         """
+        from . import rest_shape  # and all that it needs: a body that is only solved does not
+
         settings = Settings(load_steps, rtol, atol, max_iterations, progress)
         asked = rest_shape.Request(
             method, density_of, directions_of, solver, check_overlap, settings, fixed_point_options
