@@ -34,7 +34,7 @@ def draw(outcomes: Sequence[Outcome], path: Path) -> Path:
     _bars(right, names, ratios)
     right.axhline(1.0, color=_COLOUR["inverse"], lw=1.5)
     right.axhline(5.0, color="black", lw=1, ls=":")
-    right.set(ylabel="time over that of the inverse solve", title="Time (× : no rest shape found)")
+    right.set(ylabel="time over that of the inverse solve", title="Time (dotted: bar; ×: no rest shape found)")
     figure.legend(*_legend(left, right), loc="outside lower center", ncols=4, fontsize=9)
     figure.suptitle("Rest shapes: inverse solve against fixed points of forward solves")
     return save(figure, path)
@@ -53,6 +53,8 @@ def _bars(axes: Any, names: Sequence[str], values: dict[str, list[float]]) -> No
             transform=axes.get_xaxis_transform(),
         )  # fmt: skip
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
     axes.set_ylim(bottom=min(0.8, 0.5 * np.nanmin(list(values.values()))))
     axes.set_xticks(places, names, fontsize=8)
     axes.grid(True, axis="y", which="both", alpha=0.25)
