@@ -34,7 +34,9 @@ def draw(outcomes: Sequence[Outcome], path: Path) -> Path:
     _bars(right, names, ratios)
     right.axhline(1.0, color=_COLOUR["inverse"], lw=1.5)
     right.axhline(5.0, color="black", lw=1, ls=":")
-    right.set(ylabel="time over that of the inverse solve", title="Time (dotted: bar; ×: none found)")
+    right.set(
+        ylabel="time over that of the inverse solve", title="Time (dotted: bar; ×: none found)"
+    )
     figure.legend(*_legend(left, right), loc="outside lower center", ncols=4, fontsize=9)
     figure.suptitle("Rest shapes: inverse solve against fixed points of forward solves")
     return save(figure, path)
