@@ -36,7 +36,7 @@ def image(tmp_path: Path) -> Path:
     [
         ("absent.nii", None, "absent.nii"),
         ("empty.nii", b"", "empty.nii"),
-        ("text.nii.gz", gzip.compress(b"not an image"), "text.nii.gz"),
+        ("text.nii.gz", gzip.compress(b"not an image", mtime=0), "text.nii.gz"),
     ],
 )
 def test_a_file_that_is_no_image(
