@@ -72,6 +72,7 @@ class Body:
         self._fixed = np.zeros((n, 3), dtype=bool)
         self._prescribed = np.zeros((n, 3))
         self._built: dict[tuple[bool, str], terms.Built] = {}
+        self._judging: dict[tuple[bool, str], terms.Built] = {}  # on rest shapes that are found
 
     @property
     def mesh(self) -> Mesh:
@@ -323,7 +324,7 @@ class Body:
             slides=list(snapshot.slides),
         )
         body._fixed, body._prescribed = self._fixed.copy(), self._prescribed.copy()
-        body._built = {}
+        body._built, body._judging = {}, {}
         return body
 
     # Inside
@@ -346,4 +347,5 @@ class Body:
 
     def _restructured(self) -> Body:
         self._built.clear()
+        self._judging.clear()
         return self

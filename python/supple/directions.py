@@ -75,7 +75,7 @@ def rest_of_loaded(
         ConvergenceError: `solve` raised it, or the directions do not settle.
     """
     trial = body.on(body.mesh)
-    trial._built = body._built  # the same terms with other values
+    trial._built, trial._judging = body._built, body._judging  # the same terms, other values
     given = _stacked(trial)
     if mirrored:
         rest = solve(trial, start)

@@ -74,7 +74,7 @@ def run(
         inverse: take the mesh for the loaded shape.
         density_of: of the inverse, as in `Body.rest_shape`.
         gmres: solve the inverse's tangents so where that arrives.
-        judge: asked of every shape that the inverse is about to end at.
+        judge: asked of the equilibria that the inverse may end at, on its path too.
 
     Raises:
         InputError: nothing resists a rigid motion, or a setting makes no sense.
@@ -84,7 +84,7 @@ def run(
     if start is None and _is_stressed(body):
         start = _unloaded(body, settings, inverse)
     native.warm = start is not None
-    native.kinks = bool(d.skins or d.slides)
+    native.kinks = d.has_kinks
     supports.require_held(body.mesh, fixed, _normals(body))
     built = assembly.system(body, inverse, density_of)
     laws = {r.law.name: r.law for r in d.regions if len(r.ids)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +43,12 @@ class Request:
         _require_one("density_of", self.density_of, STATES)
         _require_one("directions_of", self.directions_of, STATES)
         _require_one("solver", self.solver, SOLVERS)
-        fixed_point.options(self.options, self.method)
+        _ = self.fixed_point
+
+    @cached_property
+    def fixed_point(self) -> fixed_point.FixedPoint:
+        """How a fixed point runs, where ``method`` is one."""
+        return fixed_point.options(self.options, self.method)
 
 
 def find(body: Body, asked: Request, start: Rest | None) -> Rest:
@@ -60,7 +66,7 @@ def find(body: Body, asked: Request, start: Rest | None) -> Rest:
         mirrored = asked.method == "reversed-gravity"
         rounding = directions.ROUNDING
         if asked.method in FIXED_POINTS:  # nodes are off by the tolerance, strains by more
-            rounding = 100 * fixed_point.options(asked.options, asked.method).tolerance
+            rounding = 100 * asked.fixed_point.tolerance
         rest = directions.rest_of_loaded(
             body, start, lambda b, s: _find(b, asked, s), mirrored, rounding
         )
@@ -72,9 +78,8 @@ def find(body: Body, asked: Request, start: Rest | None) -> Rest:
 def _find(body: Body, asked: Request, start: Rest | None) -> Rest:
     """With the body's directions those at rest."""
     if asked.method in FIXED_POINTS:
-        chosen = fixed_point.options(asked.options, asked.method)
         rest = fixed_point.rest_shape(
-            body, asked.method, asked.settings, chosen, asked.density_of, start
+            body, asked.method, asked.settings, asked.fixed_point, asked.density_of, start
         )
     else:
         rest = _solved(body, asked, start)
@@ -86,9 +91,8 @@ def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
     """By one solve: of the inverse form, or with the loads reversed."""
     begin = None if start is None else assembly.unknowns_of(body, start)
     if asked.method == "inverse":
-        d = body._description
-        kinks = bool(d.skins or d.slides)  # at which inexact steps lose the way
-        gmres = asked.solver == "gmres" or (asked.solver == "auto" and not kinks)
+        smooth = not body._description.has_kinks  # at which inexact steps lose the way
+        gmres = asked.solver == "gmres" or (asked.solver == "auto" and smooth)
         result, built = newton.run(
             body, asked.settings, begin, True, asked.density_of, gmres, Judge(body)
         )
@@ -117,6 +121,7 @@ class Judge:
 
     def __init__(self, body: Body) -> None:
         self._body = body.on(body.mesh)
+        self._body._built = body._judging
 
     def __call__(self, found: Floats, _load_factor: float) -> Any:
         """Converged, inverted or unstable, of the unknowns ``found`` of the inverse form."""

@@ -71,6 +71,11 @@ class Description:
     slides: list[Slide] = field(default_factory=list)
     masses: Floats | None = None  # (n,) kg of the nodes, instead of the density
 
+    @property
+    def has_kinks(self) -> bool:
+        """Forces are smooth in pieces only: skins go slack, faces are slid on."""
+        return bool(self.skins or self.slides)
+
 
 @dataclass
 class FacetTerm:

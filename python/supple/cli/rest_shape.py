@@ -5,8 +5,9 @@ CASE or MESH ─► body ─► rest shape ─► rest.vtu, loaded.vtu ─► lo
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -17,6 +18,8 @@ from ._run import Run, command
 if TYPE_CHECKING:
     from ..state import Rest
 
+Work = TypeVar("Work", bound=Callable[..., Any])
+
 #: What may lie behind a rest shape that does not come back.
 _WHY = {
     "another equilibrium": "it has several stable shapes under this load, and this is another one",
@@ -26,36 +29,19 @@ _WHY = {
 _NAMES = {"values": "set", "fixed": "fix"}  # of options that are called otherwise here
 
 
+def _choice(name: str, choices: tuple[str, ...], meaning: str) -> Callable[[Work], Work]:
+    """An option that is the first of ``choices`` unless given."""
+    return click.option(
+        name, type=click.Choice(choices), default=choices[0], show_default=True, help=meaning
+    )
+
+
 @command
 @click.argument("loaded", metavar="CASE|MESH", type=click.Path(path_type=Path))
-@click.option(
-    "--method",
-    type=click.Choice(METHODS),
-    default="inverse",
-    show_default=True,
-    help="reversed-gravity is approximate, to compare with: its check fails.",
-)
-@click.option(
-    "--density-of",
-    type=click.Choice(STATES),
-    default="rest",
-    show_default=True,
-    help="The state that the density counts in.",
-)
-@click.option(
-    "--directions-of",
-    type=click.Choice(STATES),
-    default="rest",
-    show_default=True,
-    help="The state in which the law's directions, such as fibres, lie as given.",
-)
-@click.option(
-    "--solver",
-    type=click.Choice(SOLVERS),
-    default="auto",
-    show_default=True,
-    help="Of the unsymmetric tangents: auto is gmres; direct is LU.",
-)
+@_choice("--method", METHODS, "reversed-gravity is approximate, to compare with: its check fails.")
+@_choice("--density-of", STATES, "The state that the density counts in.")
+@_choice("--directions-of", STATES, "The state in which the law's fibres lie as given.")
+@_choice("--solver", SOLVERS, "Of the unsymmetric tangents: gmres, or direct (LU); auto chooses.")
 @click.option(
     "--check/--no-check",
     default=True,
