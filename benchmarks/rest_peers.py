@@ -13,9 +13,7 @@ told apart. Every method is asked for 1e-9 of the size.
 
 from __future__ import annotations
 
-import argparse
 import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -25,6 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import output
 
 import supple
 
@@ -125,26 +124,21 @@ def table(rows: dict[str, Row], body: supple.Body, machine: str) -> str:
 
 def main() -> None:
     """Measure and write."""
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--pulse", type=Path, required=True, help="virtual environment of pulse")
-    options.add_argument("--cells", type=int, default=8, help="along an edge")
-    options.add_argument("--pressure", type=float, default=250.0, help="Pa")
-    options.add_argument("--repeats", type=int, default=3)
-    options.add_argument("--out", type=Path, default=Path("out/rest_peers"))
-    given = options.parse_args()
+    parser = output.options(__doc__, repeats=3, out="out/rest_peers")
+    parser.add_argument("--pulse", type=Path, required=True, help="virtual environment of pulse")
+    parser.add_argument("--cells", type=int, default=8, help="along an edge")
+    parser.add_argument("--pressure", type=float, default=250.0, help="Pa")
+    given = parser.parse_args()
     load = os.getloadavg()[0]
     python = given.pulse / "bin" / "python"
     if not python.is_file():
         sys.exit(f"no {python}; see install_pulse.sh")
     rows = measure(given.cells, given.pressure, given.repeats, python)
-    machine = (
-        f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} before the run, medians of "
-        f"{given.repeats} repeats in turn, {os.environ.get('OMP_NUM_THREADS', 'all')} threads."
-    )
-    given.out.mkdir(parents=True, exist_ok=True)
+    threads = os.environ.get("OMP_NUM_THREADS", "all")
+    how = f"medians of {given.repeats} repeats in turn, {threads} threads"
+    machine = output.machine(load, how)
     text = table(rows, block(given.cells, given.pressure), machine)
-    (given.out / "rest_peers.md").write_text(text, encoding="utf-8")
-    print(text)
+    output.write(given.out, "rest_peers", text, machine)
 
 
 if __name__ == "__main__":

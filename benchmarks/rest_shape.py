@@ -9,20 +9,17 @@ slows both sides. A rest shape is checked before it is timed: loaded again it is
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
-import platform
 import statistics
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+import output
 
 import supple
 
@@ -160,25 +157,15 @@ def table(rows: list[Row], machine: str) -> str:
 
 def main() -> None:
     """Measure and write."""
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--repeats", type=int, default=3)
-    options.add_argument("--skip-large", action="store_true", help="leave out 100,000 dofs")
-    options.add_argument("--out", type=Path, default=Path("out/bench"))
-    given = options.parse_args()
+    parser = output.options(__doc__, repeats=3)
+    parser.add_argument("--skip-large", action="store_true", help="leave out 100,000 dofs")
+    given = parser.parse_args()
     load = os.getloadavg()[0]
     rows = [measure(case, make, given.repeats, True) for case, make in CASES.items()]
     if not given.skip_large:
         rows += [measure(case, make, 1, False) for case, make in LARGE.items()]
-    machine = (
-        f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} before the run, "
-        f"{given.repeats} repeats, `make bench`."
-    )
-    given.out.mkdir(parents=True, exist_ok=True)
-    text = table(rows, machine)
-    (given.out / "rest_shape.md").write_text(text, encoding="utf-8")
-    report = {"machine": machine, "rows": [asdict(r) for r in rows]}
-    (given.out / "rest_shape.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
-    print(text)
+    machine = output.machine(load, f"{given.repeats} repeats, `make bench`")
+    output.write(given.out, "rest_shape", table(rows, machine), machine, rows)
 
 
 if __name__ == "__main__":

@@ -10,16 +10,13 @@ machine.
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
-import platform
 import statistics
 import sys
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
+import output
 
 import supple
 
@@ -116,22 +113,11 @@ def table(rows: list[Row], machine: str) -> str:
 
 def main() -> None:
     """Measure and write."""
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--repeats", type=int, default=5)
-    options.add_argument("--out", type=Path, default=Path("out/bench"))
-    given = options.parse_args()
+    given = output.options(__doc__, repeats=5).parse_args()
     load = os.getloadavg()[0]
     rows = measure(given.repeats)
-    machine = (
-        f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} before the run, "
-        f"{given.repeats} repeats, `make bench`."
-    )
-    given.out.mkdir(parents=True, exist_ok=True)
-    text = table(rows, machine)
-    (given.out / "results.md").write_text(text, encoding="utf-8")
-    report = {"machine": machine, "rows": [asdict(r) for r in rows]}
-    (given.out / "results.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
-    print(text)
+    machine = output.machine(load, f"{given.repeats} repeats, `make bench`")
+    output.write(given.out, "results", table(rows, machine), machine, rows)
 
 
 if __name__ == "__main__":
