@@ -93,9 +93,11 @@ def require_usable(rest: Rest) -> None:
     try:
         _ = rest.mesh
     except MeshError:
-        cause, cells = _CAUSES_INVERSE["inverted"], inverted(rest)
+        causes = _CAUSES if rest.method == "reversed-gravity" else _CAUSES_INVERSE
+        cause, cells = causes["inverted"], inverted(rest)
+        what = _WHAT.get(rest.method, _WHAT["inverse"])
         raise ConvergenceError(
-            f"no rest shape: {cause}; in the shape found cells {some(cells)} are inside out at "
+            f"{what}: {cause}; in the shape found cells {some(cells)} are inside out at "
             "their corners; try a smaller load, a stiffer material, a skin or a finer mesh.",
             history=rest.history,
             cells=cells,

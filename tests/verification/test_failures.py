@@ -162,3 +162,13 @@ def test_threads_do_not_change_a_result(element):
     assert e1 == pytest.approx(e2, rel=1e-12)
     assert abs(r1 - r2).max() <= 1e-12 * abs(r1).max()
     assert abs(k1 - k2).max() <= 1e-12 * abs(k1).max()
+
+
+def test_reversed_loads_that_buckle_a_body_say_nothing_of_its_rest_shape():
+    """A column that hangs has a rest shape; stood on its head by the shortcut it gives way."""
+    body = block("P2", young=2.5e3, cells=(1, 1, 4)).gravity((0.0, 0.0, 9.81))
+    assert body.rest_shape().points[:, 2].max() < 0.2
+    with pytest.raises(supple.ConvergenceError) as caught:
+        body.rest_shape(method="reversed-gravity")
+    assert "no equilibrium under reversed loads" in str(caught.value)
+    assert "no rest shape" not in str(caught.value)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 
 import numpy as np
 import pytest
 
-from supple import InputError, Mesh
+from supple import ConvergenceError, InputError, Mesh
 from supple.cli import main
 from supple.studies import pdms_beam as pdms
-from supple.studies import published_meshes
+from supple.studies import pdms_beam_figure, published_meshes
 from supple.studies.elastica import bend
 from supple.studies.pdms_beam_report import ROUND_BAR, STRAIGHT_BAR, checks, lines, table
 from supple.studies.round_bar import round_bar, sections
@@ -98,6 +99,24 @@ def test_another_mesh_or_study_is_refused(tmp_path):
     folder = str(tmp_path)
     assert main(["study", "hanging-dome", "--data", folder, "--out", out]) == 2
     assert main(["study", "pdms-beam", "--data", folder, "--out", out]) == 2
+
+
+def test_a_shortcut_that_finds_nothing_is_told_and_drawn_without(tmp_path, monkeypatch):
+    """Where the beam under reversed gravity has no equilibrium, the study goes on."""
+    straighten = pdms.straighten
+
+    def lost(section, body, state, method="inverse"):
+        if method != "inverse":
+            raise ConvergenceError("lost")
+        return straighten(section, body, state)
+
+    monkeypatch.setattr(pdms, "straighten", lost)
+    tip = pdms.Tip("round", "Q2L", "mixed", 965.0, 1e9, 3, (0.0, -0.1, 0.0), 0.1, 1, 0.0)
+    monkeypatch.setattr(pdms, "variants", lambda: defaultdict(lambda: tip))
+    outcome = pdms.run(plan=(("Q2L", "mixed", ((2, 8), (2, 10))),))
+    assert np.isnan(outcome.inverses[1].largest)
+    assert pdms_beam_figure.draw(outcome, tmp_path / "beam.png").stat().st_size > 1e4
+    assert any("no equilibrium was found under the reversed load" in t for t in lines(outcome))
 
 
 @pytest.mark.slow

@@ -89,6 +89,15 @@ def test_the_body_at_rest_loads_back_to_shape_and_fibres(law, element, formulati
     assert largest_turn(again.directions("loaded"), given(body)) <= 1e-9
 
 
+def test_forward_solves_alone_find_the_fibres_at_rest_too():
+    """Anderson–Sellier, exact to its own tolerance, against the inverse form."""
+    body = fibrous("holzapfel_gasser_ogden", "P1", "displacement", 800.0)
+    exact = body.rest_shape(directions_of="loaded")
+    rest = body.rest_shape("sellier-anderson", directions_of="loaded", tolerance=1e-9)
+    assert abs(rest.points - exact.points).max() <= 1e-8 * body.mesh.size
+    assert 0 < largest_turn(rest.directions(), exact.directions()) <= 1e-7
+
+
 def test_crossed_fibres_of_a_pulled_strip_stand_wider_apart_at_rest():
     """tan β0 = (λ1/λ2) tan β, β from the axis of the pull; lengths of the rest shape give λ."""
     mesh = supple.Mesh.box((1, 1, 1), (0.2, 0.1, 0.05), "P1")
