@@ -262,9 +262,8 @@ def test_sensitivities_are_the_derivatives_of_the_residual(unit, distorted):
     if scalars:
         nodal = case.built.scalar_unit * 0.02 * np.cos(3 * case.mesh.points[:, 0])
     description = case.body._description
-    at = (State if case.direct else Rest)(
-        case.u, 0, [], {}, 0.0, 0 * case.u, (), description, "", nodal
-    )
+    solved = (case.u, 0, [], {}, 0.0, 0 * case.u, (), description, "", nodal)
+    at = State(*solved) if case.direct else Rest(*solved, _body=case.body)
 
     def residual(body):
         built = assembly.system(body, not case.direct)
