@@ -17,6 +17,7 @@ constexpr double kLargestShift = 1e4;
 constexpr double kSettled = 1e-2; // accuracy of the step that shows that no more are needed
 constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
 constexpr double kCreeping = 1.0 / 32.0; // of a step, below which there are better ways on
+constexpr double kBent = 0.02;           // of a step, by which arcs must differ to be looked at
 constexpr int kHopeless = 3; // full steps in a row after which the residual must have halved
 
 /// Full steps that no longer gain: a quick no, for there are better ways than to wait.
@@ -60,6 +61,7 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     d += p_.system.solve(rhs, exact, p_.minimises && exact * norm <= tol);
     if (!d.allFinite()) return Outcome::Singular;
     if (first_.size() == 0) first_ = d;
+    if (manner == Manner::Full) bend(u, d, s);
     const double length = line_search(u, d, r, norm, s, manner, moves_supports);
     if (length == 0.0) return fault();
     u += length * d;
@@ -80,6 +82,15 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     if (manner == Manner::Full && norm > tol && gain.lost(norm)) break;
   }
   return fault();
+}
+
+/// Lay the step on arcs where that leaves less force: what turns is then not stretched.
+void LoadStep::bend(const Vector& u, Vector& d, double s) {
+  if (!p_.has_energy) return;
+  const Vector arcs = p_.system.along_arcs(u, d);
+  if (!((arcs - d).cwiseAbs().maxCoeff() > kBent * d.cwiseAbs().maxCoeff())) return;
+  const double straight = p_.free_norm(p_.residual(u + d, s));
+  if (!(p_.free_norm(p_.residual(u + arcs, s)) >= straight)) d = arcs;
 }
 
 /// Factorise K at `u`; an indefinite K is shifted in the guarded manner until it is not.

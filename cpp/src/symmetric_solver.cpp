@@ -13,11 +13,10 @@ constexpr int kFewest = 30; // iterations that are always granted
 
 } // namespace
 
-SymmetricSolver::SymmetricSolver(const BlockPattern& pattern, const Reduction& reduction,
-                                 const Vector& points, MakePreconditioner make)
-    : reduction_(reduction),
-      rotations_(std::make_unique<NodeRotations>(pattern, reduction, points)),
-      product_(std::make_unique<SymmetricProduct>(reduction.pattern)), make_(std::move(make)) {}
+SymmetricSolver::SymmetricSolver(const CscPattern& pattern, const NodeRotations& rotations,
+                                 MakePreconditioner make)
+    : pattern_(pattern), rotations_(rotations),
+      product_(std::make_unique<SymmetricProduct>(pattern)), make_(std::move(make)) {}
 
 SymmetricSolver::~SymmetricSolver() = default;
 
@@ -27,7 +26,7 @@ void SymmetricSolver::forget() {
 
 FactorStatus SymmetricSolver::prepare(const Vector& values, const ConstVector& u) {
   values_ = &values;
-  turn_ = rotations_->at(u);
+  turn_ = rotations_.at(u);
   fresh_ = false;
   definite_ = Definite::Unknown;
   return usable_ && !worn_ ? FactorStatus{} : renew();
@@ -36,7 +35,7 @@ FactorStatus SymmetricSolver::prepare(const Vector& values, const ConstVector& u
 FactorStatus SymmetricSolver::renew() {
   const Stopwatch watch(work.factor);
   if (!kept_) kept_ = make_();
-  const FactorStatus status = kept_->update(reduction_.pattern, *values_);
+  const FactorStatus status = kept_->update(pattern_, *values_);
   ++work.factorisations;
   usable_ = fresh_ = status.ok();
   worn_ = false;
@@ -52,9 +51,9 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   const auto matrix = [&](const Vector& in, Vector& out) { product_->apply(*values_, in, out); };
   const auto preconditioner = [&](const Vector& in, Vector& out) {
     if (fresh_) return kept_->apply(in, out);
-    rotations_->turn(turn_, turned_, in, turned);
+    rotations_.turn(turn_, turned_, in, turned);
     kept_->apply(turned, out);
-    rotations_->turn(turned_, turn_, out, out);
+    rotations_.turn(turned_, turn_, out, out);
   };
   const int saved = kept_->break_even();
   const bool unsure = probe && definite_ == Definite::Unknown;

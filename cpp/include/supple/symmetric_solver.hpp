@@ -30,10 +30,9 @@ struct SymmetricWork {
 
 class SymmetricSolver {
  public:
-  /// @param pattern of the mesh; `reduction`, of storage Lower; `points` (3n) at rest, m. All
-  /// outlive the solver.
+  /// @param pattern of the reduced tangents, storage Lower; it and `rotations` outlive the solver.
   /// @param make the kind of preconditioner, one of which is made here for each that is kept.
-  SymmetricSolver(const BlockPattern& pattern, const Reduction& reduction, const Vector& points,
+  SymmetricSolver(const CscPattern& pattern, const NodeRotations& rotations,
                   MakePreconditioner make);
   ~SymmetricSolver();
 
@@ -57,8 +56,8 @@ class SymmetricSolver {
   FactorStatus renew();
   CgReport iterate(const Vector& rhs, double tolerance, bool probe, Vector& x);
 
-  const Reduction& reduction_;
-  std::unique_ptr<NodeRotations> rotations_;
+  const CscPattern& pattern_;
+  const NodeRotations& rotations_;
   std::unique_ptr<SymmetricProduct> product_;
   MakePreconditioner make_;
   std::unique_ptr<Preconditioner> kept_;
