@@ -55,7 +55,9 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     const bool moves_supports = d.cwiseAbs().maxCoeff() > 0.0;
     Vector rhs = -r;
     if (moves_supports) rhs -= p_.system.apply(d);
-    d += p_.system.solve(rhs, forcing.next(norm, tol));
+    // A solve as exact as the end needs may be the last: it then says whether K is definite.
+    const double exact = forcing.next(norm, tol);
+    d += p_.system.solve(rhs, exact, p_.minimises && exact * norm <= tol);
     if (!d.allFinite()) return Outcome::Singular;
     if (first_.size() == 0) first_ = d;
     const double length = line_search(u, d, r, norm, s, manner, moves_supports);
@@ -84,14 +86,14 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
 Outcome LoadStep::factorise(const Vector& u, double s, Manner manner) {
   p_.assemble_tangent(u, s);
   shift_ = 0.0;
-  indefinite_ = false;
-  FactorStatus status = p_.system.factorise();
+  const bool plain = manner == Manner::Full && p_.minimises;
+  FactorStatus status = plain ? p_.system.prepare() : p_.system.factorise();
   if (status.ok()) return Outcome::Converged;
   if (status.cause == FactorStatus::Cause::NotFinite) return Outcome::Inverted;
   if (status.cause == FactorStatus::Cause::Singular) return Outcome::Singular;
   if (manner == Manner::Full) { // on the way an indefinite K is no fault, at the end it is
-    indefinite_ = p_.system.factorise_indefinite().ok();
-    return indefinite_ ? Outcome::Converged : Outcome::LimitPoint;
+    const bool solvable = p_.system.factorise_indefinite().ok();
+    return solvable ? Outcome::Converged : Outcome::LimitPoint;
   }
   for (shift_ = 1e-3; shift_ < kLargestShift; shift_ *= 10.0) {
     if (p_.system.factorise(shift_).ok()) return Outcome::Converged;
@@ -116,8 +118,10 @@ bool LoadStep::settled(Vector& u, Vector& r, double norm, double step, double s)
 /// An equilibrium with an indefinite tangent is not where a body rests.
 Outcome LoadStep::stable(const Vector& u) {
   if (!p_.has_energy) return Outcome::Converged;
-  const bool known = p_.minimises && shift_ == 0.0 && !indefinite_; // definite one step ago
-  if (known) return Outcome::Converged;
+  if (p_.minimises && shift_ == 0.0) { // what K was one step ago
+    if (p_.system.definite() == Definite::Unknown) p_.system.factorise();
+    if (p_.system.definite() == Definite::Yes) return Outcome::Converged;
+  }
   p_.result.negative =
       p_.minimises ? unstable_directions(p_.system, u) : unstable_directions_of_saddle(p_.system);
   return p_.result.negative > 0 ? Outcome::Unstable : Outcome::Converged;

@@ -29,7 +29,6 @@ class LoadStep {
   Problem& p_;
   Vector first_;
   double shift_ = 0.0;
-  bool indefinite_ = false;
 };
 
 } // namespace supple

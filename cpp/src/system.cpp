@@ -26,6 +26,16 @@ void System::forget_factors() {
   factor_.reset();
   indefinite_.reset();
   inverse_.reset();
+  symmetric_.reset();
+}
+
+void System::use_method(Method method) {
+  if (method != method_) symmetric_.reset();
+  method_ = method;
+}
+
+void System::forget_kept() {
+  if (symmetric_) symmetric_->forget();
 }
 
 void System::use_gmres(bool gmres) {
@@ -40,6 +50,7 @@ void System::move_points(const ConstVector& points) {
   require_size("points", points.size(), static_cast<Index>(points_->size()), "three a node");
   *points_ = points;
   inverse_.reset(); // it knows the loaded shape
+  if (symmetric_) symmetric_->forget();
 }
 
 void System::set_free(Mask free) {
@@ -136,8 +147,7 @@ FactorStatus System::factorise(double shift) {
     factor_ = std::make_unique<Factor>(kind());
     factor_->analyse(r.pattern);
   }
-  reduced_.resize(r.pattern.nonzeros());
-  r.gather(values_, reduced_);
+  gather();
   if (shift > 0.0) {
     // The lower triangle's columns begin with their diagonal entry.
     double mean = 0.0;
@@ -151,7 +161,58 @@ FactorStatus System::factorise(double shift) {
   }
   current_ = factor_.get();
   ++timings.factorisations;
-  return factor_->factorise(reduced_);
+  const FactorStatus status = factor_->factorise(reduced_);
+  definite_ = status.ok() && kind() == Kind::Cholesky && shift == 0.0    ? Definite::Yes
+              : status.cause == FactorStatus::Cause::NotPositiveDefinite ? Definite::No
+                                                                         : Definite::Unknown;
+  return status;
+}
+
+/// The reduced tangent's values from those last assembled.
+void System::gather() {
+  const Reduction& r = reduction();
+  reduced_.resize(r.pattern.nonzeros());
+  r.gather(values_, reduced_);
+}
+
+FactorStatus System::prepare() {
+  if (!keeps()) return factorise();
+  if (!symmetric_) {
+    const Stopwatch watch(timings.factor);
+    symmetric_ = std::make_unique<SymmetricSolver>(pattern(), reduction(), *points_,
+                                                   make_factor_preconditioner);
+  }
+  gather();
+  current_ = nullptr;
+  const FactorStatus status = symmetric_->prepare(reduced_, at_);
+  count_kept();
+  return status;
+}
+
+Definite System::definite() const {
+  return current_ == nullptr && symmetric_ ? symmetric_->definite() : definite_;
+}
+
+/// By conjugate gradients; by LDLᵀ where those led to a new factor that the tangent does not have.
+void System::solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x) {
+  const FactorStatus status = symmetric_->solve(rhs, tolerance, probe, x);
+  count_kept();
+  if (status.ok()) return;
+  definite_ = symmetric_->definite();
+  if (status.cause == FactorStatus::Cause::NotPositiveDefinite && factorise_indefinite().ok()) {
+    current_->solve(rhs, x);
+  } else {
+    x.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+}
+
+void System::count_kept() {
+  SymmetricWork& work = symmetric_->work;
+  timings.factor += work.factor;
+  timings.solve += work.solve;
+  timings.factorisations += work.factorisations;
+  timings.krylov_iterations += work.iterations;
+  work = {};
 }
 
 FactorStatus System::prepare_inverse() {
@@ -177,20 +238,21 @@ FactorStatus System::factorise_indefinite() {
     indefinite_ = std::make_unique<Factor>(Kind::QuasiDefinite);
     indefinite_->analyse(r.pattern);
   }
-  reduced_.resize(r.pattern.nonzeros());
-  r.gather(values_, reduced_);
+  gather();
   current_ = indefinite_.get();
   ++timings.factorisations;
   return indefinite_->factorise(reduced_);
 }
 
-Vector System::solve(const ConstVector& rhs, double tolerance) {
+Vector System::solve(const ConstVector& rhs, double tolerance, bool probe) {
   const Reduction& r = reduction();
   Vector x(r.free());
   if (iterates()) {
     if (!inverse_->solve(r.restrict(rhs), tolerance, x))
       x.setConstant(std::numeric_limits<double>::quiet_NaN());
     count_work();
+  } else if (current_ == nullptr) {
+    solve_kept(r.restrict(rhs), tolerance, probe, x);
   } else {
     const Stopwatch watch(timings.solve);
     Refinement refinement;
