@@ -160,6 +160,8 @@ void bind_system(py::module_& module) {
   bind_terms(module);
   bind_newton(module);
   py::class_<supple::Timings>(module, "Timings")
+      .def_readonly("analysis", &supple::Timings::analysis)
+      .def_readonly("residual", &supple::Timings::residual)
       .def_readonly("assembly", &supple::Timings::assembly)
       .def_readonly("factor", &supple::Timings::factor)
       .def_readonly("solve", &supple::Timings::solve)

@@ -65,6 +65,7 @@ Kind System::kind() const {
 }
 
 double System::energy(const ConstVector& u, double load_factor) const {
+  const Stopwatch watch(timings.residual);
   double total = 0.0;
   for (const auto& term : terms_)
     total += factor_of(*term, load_factor) * term->energy(u);
@@ -72,6 +73,7 @@ double System::energy(const ConstVector& u, double load_factor) const {
 }
 
 Vector System::residual(const ConstVector& u, double load_factor) const {
+  const Stopwatch watch(timings.residual);
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_)
     term->residual(u, factor_of(*term, load_factor), r);
@@ -79,6 +81,7 @@ Vector System::residual(const ConstVector& u, double load_factor) const {
 }
 
 Vector System::external(const ConstVector& u) const {
+  const Stopwatch watch(timings.residual);
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_) {
     if (term->is_load) term->residual(u, -1.0, r);
@@ -87,6 +90,7 @@ Vector System::external(const ConstVector& u) const {
 }
 
 VolumeRatio System::volume_ratio(const ConstVector& u) const {
+  const Stopwatch watch(timings.residual);
   VolumeRatio smallest;
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const VolumeRatio ratio = terms_[t]->volume_ratio(u);
@@ -97,6 +101,7 @@ VolumeRatio System::volume_ratio(const ConstVector& u) const {
 
 const BlockPattern& System::pattern() {
   if (!pattern_) {
+    const Stopwatch watch(timings.analysis);
     std::vector<Connectivity> cells;
     cells.reserve(terms_.size());
     for (const auto& term : terms_)
@@ -123,7 +128,9 @@ const Reduction& System::reduction() {
   if (!reduction_) {
     if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
     const Storage part = iterates() ? Storage::Lower : storage(kind());
-    reduction_ = std::make_unique<Reduction>(reduce(pattern(), free_, part));
+    const BlockPattern& whole = pattern();
+    const Stopwatch watch(timings.analysis);
+    reduction_ = std::make_unique<Reduction>(reduce(whole, free_, part));
   }
   return *reduction_;
 }
@@ -131,11 +138,12 @@ const Reduction& System::reduction() {
 FactorStatus System::factorise(double shift) {
   const Reduction& r = reduction();
   if (iterates()) return prepare_inverse();
-  const Stopwatch watch(timings.factor);
   if (!factor_) {
+    const Stopwatch analysing(timings.analysis);
     factor_ = std::make_unique<Factor>(kind());
     factor_->analyse(r.pattern);
   }
+  const Stopwatch watch(timings.factor);
   reduced_.resize(r.pattern.nonzeros());
   r.gather(values_, reduced_);
   if (shift > 0.0) {
@@ -172,11 +180,12 @@ void System::count_work() {
 
 FactorStatus System::factorise_indefinite() {
   const Reduction& r = reduction();
-  const Stopwatch watch(timings.factor);
   if (!indefinite_) {
+    const Stopwatch analysing(timings.analysis);
     indefinite_ = std::make_unique<Factor>(Kind::QuasiDefinite);
     indefinite_->analyse(r.pattern);
   }
+  const Stopwatch watch(timings.factor);
   reduced_.resize(r.pattern.nonzeros());
   r.gather(values_, reduced_);
   current_ = indefinite_.get();
