@@ -61,7 +61,8 @@ class Nearby:
         u = first.u.copy()
         for weight, k in zip(weights, near[1:], strict=True):
             u += weight * (alike[k][1].u - first.u)
-        return replace(first, u=u)
+        carried: State = replace(first, u=u)
+        return carried
 
 
 def _weights(away: Floats) -> Floats:
