@@ -39,6 +39,12 @@ supple::NewtonResult solve(supple::System& system, const Vector& start, const Ve
   return supple::solve(system, start, prescribed, settings, report);
 }
 
+/// A copy as an array; py::cast would make a list of Python's numbers first.
+template <class Number>
+py::array_t<Number> array(const std::vector<Number>& values) {
+  return py::array_t<Number>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
 py::tuple tangent(supple::System& system, const Vector& u) {
   const auto assembled = [&]() -> const Vector& {
     const py::gil_scoped_release release;
@@ -46,8 +52,7 @@ py::tuple tangent(supple::System& system, const Vector& u) {
   };
   const Vector& values = assembled();
   const supple::BlockPattern& pattern = system.pattern();
-  return py::make_tuple(values, py::array(py::cast(pattern.column)),
-                        py::array(py::cast(pattern.row_start)));
+  return py::make_tuple(values, array(pattern.column), array(pattern.row_start));
 }
 
 void bind_terms(py::module_& module) {

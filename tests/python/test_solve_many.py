@@ -146,13 +146,9 @@ def test_changes_of_structure_and_of_loads_go_through_a_function(
 
 
 @pytest.mark.parametrize("processes", COUNTS)
-def test_what_has_no_equilibrium_is_an_error_in_its_place(
-    helpers: Any, processes: int
-) -> None:
+def test_what_has_no_equilibrium_is_an_error_in_its_place(helpers: Any, processes: int) -> None:
     """An end pushed through the other inverts cells whatever the law; the others are solved."""
-    first, error, last = body().solve_many(
-        [-0.01, -0.41, 0.01], processes, change=helpers.squeezed
-    )
+    first, error, last = body().solve_many([-0.01, -0.41, 0.01], processes, change=helpers.squeezed)
     assert isinstance(error, ConvergenceError)
     assert 0 < error.load_factor < 1
     assert error.history

@@ -6,13 +6,16 @@ from pathlib import Path
 
 import click
 
+from ..profile import phase
+from . import _profile
 from ._run import Run, command
 
 
 @command
 @click.argument("case", type=click.Path(path_type=Path))
 @click.option("--allow-energy-files", is_flag=True, help="Compile energy files that CASE names.")
-def solve(run: Run, case: Path, allow_energy_files: bool) -> None:
+@_profile.option
+def solve(run: Run, case: Path, allow_energy_files: bool, profiled: bool) -> None:
     r"""Solve for the deformed shape of the body in CASE, a TOML file.
 
     Writes deformed.vtu and result.json to --out (default: out/ and the name of CASE). Tables of a
@@ -38,13 +41,17 @@ def solve(run: Run, case: Path, allow_energy_files: bool) -> None:
           = [0, 4, 17]                   ids
           = { z = "max", x = [0, 0.1] }  a place: an end, a coordinate, an interval
     """
-    from ..case import read_case
-    from . import _report
-    from ._body_case import read_body
-
     run.out_or(Path("out") / case.stem)
     run.progress("reading")
-    body, settings = read_body(read_case(case), allow_energy_files=allow_energy_files)
-    run.progress("compiling")
-    state = body.solve(progress=_report.progress(run, "solving"), **settings)
-    _report.equilibrium(run, state, body.mesh, "deformed.vtu")
+    with _profile.collecting(profiled) as profile:
+        with phase("imports"):
+            from ..case import read_case
+            from . import _report
+            from ._body_case import read_body
+        with phase("reading"):
+            body, settings = read_body(read_case(case), allow_energy_files=allow_energy_files)
+        run.progress("compiling")
+        state = body.solve(progress=_report.progress(run, "solving"), **settings)
+        with phase("writing"):
+            _report.equilibrium(run, state, body.mesh, "deformed.vtu")
+    _profile.report(run, profile, state)
