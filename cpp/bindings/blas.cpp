@@ -9,6 +9,6 @@ void bind_blas(py::module_& module) {
       .def_readonly("config", &BlasReport::config)
       .def_readonly("threads", &BlasReport::threads)
       .def_readonly("gflops", &BlasReport::gflops);
-  module.def("blas_report", &supple::blas_report);
+  module.def("blas_report", &supple::blas_report, Unlocked());
   module.def("set_blas_threads", &supple::set_blas_threads);
 }

@@ -12,6 +12,6 @@ void bind_closest_point(py::module_& module) {
       .def_readonly("normal", &Projection::normal)
       .def_readonly("barycentric", &Projection::barycentric);
   py::class_<supple::SurfaceTree>(module, "SurfaceTree")
-      .def(py::init<const supple::Points&, const supple::Triangles&>())
-      .def("closest", &supple::SurfaceTree::closest, py::call_guard<py::gil_scoped_release>());
+      .def(py::init<const supple::Points&, const supple::Triangles&>(), Unlocked())
+      .def("closest", &supple::SurfaceTree::closest, Unlocked());
 }

@@ -11,6 +11,9 @@
 
 namespace py = pybind11;
 
+/// Other Python threads run while C++ works: on every call that may take longer than a glance.
+using Unlocked = py::call_guard<py::gil_scoped_release>;
+
 /// A (k, m) int32 array, row-major.
 using CellArray = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 

@@ -39,11 +39,20 @@ supple::NewtonResult solve(supple::System& system, const Vector& start, const Ve
   return supple::solve(system, start, prescribed, settings, report);
 }
 
+/// A copy as an array; py::cast would make a list of Python's numbers first.
+template <class Number>
+py::array_t<Number> array(const std::vector<Number>& values) {
+  return py::array_t<Number>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
 py::tuple tangent(supple::System& system, const Vector& u) {
-  const Vector values = system.assemble_tangent(u, 1.0);
+  const auto assembled = [&]() -> const Vector& {
+    const py::gil_scoped_release release;
+    return system.assemble_tangent(u, 1.0);
+  };
+  const Vector& values = assembled();
   const supple::BlockPattern& pattern = system.pattern();
-  return py::make_tuple(values, py::array(py::cast(pattern.column)),
-                        py::array(py::cast(pattern.row_start)));
+  return py::make_tuple(values, array(pattern.column), array(pattern.row_start));
 }
 
 void bind_terms(py::module_& module) {
@@ -53,14 +62,16 @@ void bind_terms(py::module_& module) {
       .def_readonly("term", &supple::VolumeRatio::term);
   py::class_<supple::Term, std::shared_ptr<supple::Term>>(module, "Term")
       .def_readwrite("is_load", &supple::Term::is_load)
-      .def("energy", &supple::Term::energy)
-      .def("residual",
-           [](const supple::Term& term, const Vector& u) {
-             Vector r = Vector::Zero(u.size());
-             term.residual(u, 1.0, r);
-             return r;
-           })
-      .def("volume_ratio", &supple::Term::volume_ratio);
+      .def("energy", &supple::Term::energy, Unlocked())
+      .def(
+          "residual",
+          [](const supple::Term& term, const Vector& u) {
+            Vector r = Vector::Zero(u.size());
+            term.residual(u, 1.0, r);
+            return r;
+          },
+          Unlocked())
+      .def("volume_ratio", &supple::Term::volume_ratio, Unlocked());
   py::class_<supple::NodalForce, supple::Term, std::shared_ptr<supple::NodalForce>>(module,
                                                                                     "NodalForce")
       .def(py::init<Vector>())
@@ -95,7 +106,7 @@ void bind_terms(py::module_& module) {
             return Rows(Eigen::Map<const Rows>(table.points, table.point_count, table.dimension));
           })
       .def("set_field", &supple::KernelTerm::set_field)
-      .def("tabulate", &supple::KernelTerm::tabulate)
+      .def("tabulate", &supple::KernelTerm::tabulate, Unlocked())
       .def_property_readonly("weights", [](const supple::KernelTerm& term) {
         const supple_library& table = term.library().table();
         return Vector(Eigen::Map<const Vector>(table.weights, table.point_count));
@@ -104,9 +115,10 @@ void bind_terms(py::module_& module) {
       .def(py::init([](const supple::System& system, std::vector<supple::Index> nodes,
                        const Vector& stiffness, const supple::Points& vertices,
                        const supple::Triangles& triangles, bool inverse) {
-        return std::make_shared<supple::Sliding>(system.points(), std::move(nodes), stiffness,
-                                                 vertices, triangles, inverse);
-      }));
+             return std::make_shared<supple::Sliding>(system.points(), std::move(nodes), stiffness,
+                                                      vertices, triangles, inverse);
+           }),
+           Unlocked());
 }
 
 void bind_newton(py::module_& module) {
@@ -160,6 +172,8 @@ void bind_system(py::module_& module) {
   bind_terms(module);
   bind_newton(module);
   py::class_<supple::Timings>(module, "Timings")
+      .def_readonly("analysis", &supple::Timings::analysis)
+      .def_readonly("residual", &supple::Timings::residual)
       .def_readonly("assembly", &supple::Timings::assembly)
       .def_readonly("factor", &supple::Timings::factor)
       .def_readonly("solve", &supple::Timings::solve)
@@ -181,19 +195,18 @@ void bind_system(py::module_& module) {
       .def("use_gmres", &System::use_gmres)
       .def("use_method", &System::use_method)
       .def("forget_kept", &System::forget_kept)
-      .def("energy", &System::energy)
-      .def("residual", &System::residual)
-      .def("external", &System::external)
-      .def("volume_ratio", &System::volume_ratio)
+      .def("energy", &System::energy, Unlocked())
+      .def("residual", &System::residual, Unlocked())
+      .def("external", &System::external, Unlocked())
+      .def("volume_ratio", &System::volume_ratio, Unlocked())
       .def("tangent", &tangent)
       .def("has_energy", &System::has_energy)
       .def("is_minimised",
            [](const System& s) { return s.has_energy() && s.kind() == supple::Kind::Cholesky; })
-      .def("unstable_directions",
-           [](System& system, const Vector& u) {
-             const py::gil_scoped_release release;
-             return supple::unstable_directions(system, u);
-           })
+      .def(
+          "unstable_directions",
+          [](System& system, const Vector& u) { return supple::unstable_directions(system, u); },
+          Unlocked())
       .def("reset_timings", [](System& system) { system.timings = {}; })
       .def_readonly("timings", &System::timings)
       .def("solve", &solve);

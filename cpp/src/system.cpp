@@ -82,6 +82,7 @@ Kind System::kind() const {
 }
 
 double System::energy(const ConstVector& u, double load_factor) const {
+  const Stopwatch watch(timings.residual);
   double total = 0.0;
   for (const auto& term : terms_)
     total += factor_of(*term, load_factor) * term->energy(u);
@@ -89,6 +90,7 @@ double System::energy(const ConstVector& u, double load_factor) const {
 }
 
 Vector System::residual(const ConstVector& u, double load_factor) const {
+  const Stopwatch watch(timings.residual);
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_)
     term->residual(u, factor_of(*term, load_factor), r);
@@ -96,6 +98,7 @@ Vector System::residual(const ConstVector& u, double load_factor) const {
 }
 
 Vector System::external(const ConstVector& u) const {
+  const Stopwatch watch(timings.residual);
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_) {
     if (term->is_load) term->residual(u, -1.0, r);
@@ -104,6 +107,7 @@ Vector System::external(const ConstVector& u) const {
 }
 
 VolumeRatio System::volume_ratio(const ConstVector& u) const {
+  const Stopwatch watch(timings.residual);
   VolumeRatio smallest;
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const VolumeRatio ratio = terms_[t]->volume_ratio(u);
@@ -114,6 +118,7 @@ VolumeRatio System::volume_ratio(const ConstVector& u) const {
 
 const BlockPattern& System::pattern() {
   if (!pattern_) {
+    const Stopwatch watch(timings.analysis);
     std::vector<Connectivity> cells;
     cells.reserve(terms_.size());
     for (const auto& term : terms_)
@@ -140,7 +145,9 @@ const Reduction& System::reduction() {
   if (!reduction_) {
     if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
     const Storage part = iterates() ? Storage::Lower : storage(kind());
-    reduction_ = std::make_unique<Reduction>(reduce(pattern(), free_, part));
+    const BlockPattern& whole = pattern();
+    const Stopwatch watch(timings.analysis);
+    reduction_ = std::make_unique<Reduction>(reduce(whole, free_, part));
   }
   return *reduction_;
 }
@@ -148,11 +155,12 @@ const Reduction& System::reduction() {
 FactorStatus System::factorise(double shift) {
   const Reduction& r = reduction();
   if (iterates()) return prepare_inverse();
-  const Stopwatch watch(timings.factor);
   if (!factor_) {
+    const Stopwatch analysing(timings.analysis);
     factor_ = std::make_unique<Factor>(kind());
     factor_->analyse(r.pattern);
   }
+  const Stopwatch watch(timings.factor);
   gather();
   if (shift > 0.0) {
     // The lower triangle's columns begin with their diagonal entry.
@@ -248,11 +256,12 @@ void System::count_work() {
 
 FactorStatus System::factorise_indefinite() {
   const Reduction& r = reduction();
-  const Stopwatch watch(timings.factor);
   if (!indefinite_) {
+    const Stopwatch analysing(timings.analysis);
     indefinite_ = std::make_unique<Factor>(Kind::QuasiDefinite);
     indefinite_->analyse(r.pattern);
   }
+  const Stopwatch watch(timings.factor);
   gather();
   current_ = indefinite_.get();
   ++timings.factorisations;

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import terms
+from .alone import alone
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 
+@alone
 def assemble(
     body: Body, u: npt.ArrayLike, pressure: npt.ArrayLike | None = None
 ) -> tuple[float, Floats, csr_array]:

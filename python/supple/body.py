@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import threading
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import assembly, failures, newton, parameters, supports, terms
+from . import assembly, failures, many, newton, parameters, supports, terms
 from . import body_checks as checks
+from .alone import alone
 from .errors import InputError
 from .laws import read_law
 from .mesh_tags import CellWhere, Where
@@ -71,8 +74,8 @@ class Body:
         )
         self._fixed = np.zeros((n, 3), dtype=bool)
         self._prescribed = np.zeros((n, 3))
-        self._built: dict[tuple[bool, str], terms.Built] = {}
-        self._judging: dict[tuple[bool, str], terms.Built] = {}  # on rest shapes that are found
+        self._restructured()
+        self._busy = threading.Lock()
 
     @property
     def mesh(self) -> Mesh:
@@ -223,6 +226,49 @@ class Body:
 
     # Solving
 
+    def solve_many(
+        self,
+        parameters: Sequence[Any],
+        processes: int | None = None,
+        warm: bool = True,
+        reduce: Callable[[State], Any] | None = None,
+        change: Callable[[Body, Any], object] = many.change,
+        progress: Callable[[int, int], None] | None = None,
+        **settings: Any,
+    ) -> list[Any]:
+        """Equilibrium for each of many sets of parameters, in several processes at once.
+
+        Each is this body with the changes of one entry and of no other; the body stays as it is.
+
+        Args:
+            parameters: mappings from names to values. "young" is a parameter of all cells, a number
+                or one a cell; "tumour.young" of the cells of that tag; "skin.young" of the first
+                skin; "gravity" the acceleration (3,) m/s².
+            processes: at most as many as processors if None, and only this one where spawning more
+                would take longer than to do the work. Each has one thread and a copy of the body.
+                1 keeps to this process, and so does a call inside of a worker.
+            warm: start from what the same process has solved nearby, and from zero where that
+                fails. False is from zero always: repeatable to the last bit.
+            reduce: called with each state where it was solved; what it returns is all that comes
+                back, so that large states need not.
+            change: what an entry means where a mapping does not say it: ``change(body, entry)``
+                makes the changes.
+            progress: called with how many are done, and of how many; may raise to stop.
+            **settings: load_steps, rtol, atol, max_iterations, solver: as in `solve`.
+
+        Returns:
+            in the order of ``parameters``, the `State` (or what ``reduce`` made of it); where
+            there is none, the `ConvergenceError`, or the `SuppleError` of a process that died.
+            Those of other entries are there all the same.
+
+        Raises:
+            InputError: an entry that does not fit the body, before anything is solved; functions
+                that another process cannot import.
+        """
+        asked = many.Request(parameters, processes, warm, reduce, change, progress, settings)
+        return many.solve(self, asked)
+
+    @alone
     def solve(
         self,
         start: State | None = None,
@@ -261,6 +307,7 @@ class Body:
             **outcome(result, built, self._description, self._fixed), _solved=solved, _form="direct"
         )
 
+    @alone
     def rest_shape(
         self,
         method: str = "inverse",
@@ -325,7 +372,6 @@ class Body:
             slides=list(snapshot.slides),
         )
         body._fixed, body._prescribed = self._fixed.copy(), self._prescribed.copy()
-        body._built, body._judging = {}, {}
         return body
 
     # Inside
@@ -347,6 +393,15 @@ class Body:
         return body
 
     def _restructured(self) -> Body:
-        self._built.clear()
-        self._judging.clear()
+        self._built: dict[tuple[bool, str], terms.Built] = {}
+        self._judging: dict[tuple[bool, str], terms.Built] = {}  # on rest shapes that are found
         return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy gets, here or in another process: nothing of the runtime."""
+        return {n: v for n, v in vars(self).items() if n not in ("_built", "_judging", "_busy")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._busy = threading.Lock()
+        self._restructured()

@@ -13,9 +13,11 @@ from pathlib import Path
 from types import ModuleType
 
 from .errors import SuppleError
+from .profile import phase
 
 
 @cache
+@phase("imports")
 def core() -> ModuleType:
     """``supple._core``.
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import MaterialError
+from .profile import phase
 
 if TYPE_CHECKING:
     from .kernels.reader import Law, Parameter
@@ -91,8 +93,13 @@ def compiled(unit: Unit) -> str:
     """
     from .kernels import build, reader
 
+    begin = time.time()
     try:
-        return str(build.library(unit, _ahead()))
+        with phase("kernels found") as part:
+            library = build.library(unit, _ahead())
+            if library.stat().st_mtime >= begin:
+                part.name = "kernels compiled"
+        return str(library)
     except (reader.EnergyFileError, build.BuildError) as problem:
         raise MaterialError(str(problem)) from None
 

@@ -14,6 +14,7 @@ from supple import mesh_box, mesh_checks, mesh_jacobian, mesh_topology
 from supple.errors import InputError, MeshError
 from supple.kernels.cells import NO_NODE, Element
 from supple.mesh_tags import CellWhere, Tag, Where, chosen, find_tag
+from supple.profile import phase
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -43,6 +44,7 @@ class Mesh:
     tags: Mapping[str, Tag] = field(default_factory=dict)
     _outside: Ints = field(init=False)  # boundary facets, outward
 
+    @phase("checks")
     def __post_init__(self) -> None:
         table = mesh_checks.checked_element(self.element)
         points = mesh_checks.checked_points(self.points)

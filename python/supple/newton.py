@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import assembly, solvers, supports, terms
+from . import assembly, profile, solvers, supports, terms
 from .core import core
 from .errors import InputError
 
@@ -102,7 +102,9 @@ def run(
         start = np.zeros_like(target)
     else:
         start[fixed.size :] /= built.scalar_unit
-    return solve(built.system, start, target, native, settings, judge), built
+    result = solve(built.system, start, target, native, settings, judge)
+    profile.native(built.system.timings, len(result.history))
+    return result, built
 
 
 def solve(

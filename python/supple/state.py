@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 #: Keys of `Equilibrium.timings`: seconds, then counts.
-PHASES = ("assembly", "factor", "solve", "total", "factorisations", "krylov_iterations")
+PHASES = ("analysis", "residual", "assembly", "factor", "solve", "total", "factorisations",
+          "krylov_iterations")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,10 @@ class Equilibrium:
         u: (n, 3) displacement of the nodes of the mesh that was solved on, m.
         iterations: Newton iterations over all load steps.
         history: one dict an iteration.
-        timings: seconds of "assembly", "factor", "solve", "total"; how many "factorisations" and
-            "krylov_iterations" there were; which "solver" was picked and why, a sentence.
+        timings: seconds of "analysis" (pattern, ordering, symbolic factor: once a body), "residual"
+            (forces, energies, volume ratios), "assembly", "factor", "solve", "total"; how many
+            "factorisations" and "krylov_iterations" there were; which "solver" was picked and why,
+            a sentence.
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from .errors import InputError
 from .mesh_topology import by_kind
+from .profile import phase
 
 if TYPE_CHECKING:
     from .mesh import Mesh
@@ -20,6 +21,7 @@ _MOTIONS = ("shift along x", "shift along y", "shift along z",
             "turn about x", "turn about y", "turn about z")  # fmt: skip
 
 
+@phase("checks")
 def require_held(mesh: Mesh, fixed: npt.NDArray[np.bool_], normals: dict[int, Floats]) -> None:
     """Refuse a body with a rigid motion that no support resists.
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from .core import core
-from .laws import compiled
+from .laws import compiled, read_law
 from .solvers import Pick
 
 if TYPE_CHECKING:
@@ -35,6 +36,10 @@ class Region:
     law: Law
     ids: Ints
     values: dict[str, Floats]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process reads the law's file itself: what is compiled of it stays here."""
+        return _region, (self.law.path, self.ids, self.values)
 
 
 @dataclass
@@ -263,6 +268,10 @@ def _facets(mesh: Mesh, facets: Ints) -> Iterator[tuple[str, npt.NDArray[np.int3
 
     for kind, rows in by_kind(facets, mesh.table):
         yield kind.name, np.ascontiguousarray(facets[np.ix_(rows, kind.from_vtk)], np.int32), rows
+
+
+def _region(path: Path, ids: Ints, values: dict[str, Floats]) -> Region:
+    return Region(read_law(path), ids, values)
 
 
 def snapshot(d: Description) -> Description:

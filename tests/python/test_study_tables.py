@@ -1,15 +1,12 @@
-"""Tables of long studies: whole lines, any order, resumed to the same table; workers that stop."""
+"""Tables of long studies: whole lines, any order, resumed to the same table."""
 
 from __future__ import annotations
 
-import os
-import signal
 from pathlib import Path
 
 import pytest
 
 import supple
-from supple.studies import workers
 from supple.studies.journal import Journal
 
 COLUMNS = ("number", "word")
@@ -58,26 +55,3 @@ def test_another_file_is_refused_and_left_as_it_is(tmp_path: Path, text: str) ->
     with pytest.raises(supple.InputError, match="--resume"):
         Journal(path, COLUMNS)
     assert path.read_text(encoding="utf-8") == text
-
-
-def test_workers_have_one_thread_and_the_caller_keeps_its_own() -> None:
-    before = dict(os.environ), signal.getsignal(signal.SIGINT)
-    found = list(workers.results(os.getenv, [("OMP_NUM_THREADS",)], jobs=1))
-    assert found == ["1"]
-    assert (dict(os.environ), signal.getsignal(signal.SIGINT)) == before
-
-
-def test_results_come_once_each_whoever_ends_first() -> None:
-    found = list(workers.results(pow, [(n, 2) for n in range(7)], jobs=2))
-    assert sorted(found) == [n**2 for n in range(7)]
-    assert list(workers.results(pow, [], jobs=2)) == []
-
-
-def test_what_a_worker_raises_reaches_the_caller() -> None:
-    with pytest.raises(ZeroDivisionError):
-        list(workers.results(divmod, [(1, 0)], jobs=1))
-
-
-def test_a_worker_that_dies_is_an_error_in_words() -> None:
-    with pytest.raises(supple.SuppleError, match="worker process was ended"):
-        list(workers.results(os._exit, [(1,)], jobs=1))

@@ -13,6 +13,8 @@ namespace supple {
 
 /// Seconds spent in the phases of a solve, and how often its costly parts were done.
 struct Timings {
+  double analysis = 0.0; ///< pattern, scatter map, ordering and symbolic factor
+  double residual = 0.0; ///< residuals, energies and volume ratios
   double assembly = 0.0, factor = 0.0, solve = 0.0, total = 0.0;
   int factorisations = 0, krylov_iterations = 0;
 };
@@ -93,7 +95,7 @@ class System {
   /// quasi-definite one those of its last factor.
   Inertia inertia();
 
-  Timings timings;
+  mutable Timings timings; ///< of what only asks, too
 
  private:
   bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }

@@ -8,13 +8,9 @@ not exist the cost is a barrier. Mazier 2022, §5.4; Hansen (2016), arXiv:1604.0
 
 from __future__ import annotations
 
-import os
-import signal
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +19,7 @@ from supple.breast.model import Materials, build_body, set_materials
 from supple.breast.poses import IMPATIENCE, Poses, solve_poses
 from supple.breast.skin_misfit import SkinMisfit, mean_absolute
 from supple.errors import ConvergenceError, InputError
-from supple.threads import one_thread
+from supple.workers import Workers, available
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,8 +32,6 @@ if TYPE_CHECKING:
 METHODS = ("cma-es",)
 #: Cost of parameters without a rest shape, m, and more the less of gravity was reached.
 BARRIER = 0.1
-#: Seconds after which one generation's workers are given up as lost.
-TIMEOUT = 600.0
 #: Errors of the model are alike over this length of skin, m: it counts as one observation.
 CORRELATION = 30e-3
 
@@ -169,9 +163,14 @@ def identify(
         raise InputError(f"method must be one of {', '.join(METHODS)}, got {s.method!r}.")
     for name in s.parameters:
         materials.of(name)
-    with _evaluator(s.workers, (mesh, materials, support, misfit, s)) as evaluate:
-        trials = _search(evaluate, s, watch)
+    with Workers(min(s.workers, available()), Search, mesh, materials, support, misfit, s) as pool:
+        trials = _search(lambda xs: _evaluated(pool, xs), s, watch)
     return _conclude(trials, materials, s, _skin_area(mesh))
+
+
+def _evaluated(pool: Workers, xs: list[Floats]) -> list[Trial]:
+    trials = dict(pool.answers(xs))
+    return [trials[number] for number in range(len(xs))]
 
 
 def _search(
@@ -245,34 +244,3 @@ def _skin_area(mesh: BreastMesh) -> float:
     """Area of the model's prone skin, m²."""
     a, b, c = (mesh.points[mesh.skin[:, i]] for i in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
-
-
-_worker: Search | None = None
-
-
-def _start_worker(parts: tuple[BreastMesh, Materials, str, SkinMisfit, IdentifySettings]) -> None:
-    global _worker
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
-    _worker = Search(*parts)
-
-
-def _run_worker(x: Floats) -> Trial:
-    assert _worker is not None, "the pool starts its workers with _start_worker"
-    return _worker(x)
-
-
-@contextmanager
-def _evaluator(
-    workers: int, parts: tuple[BreastMesh, Materials, str, SkinMisfit, IdentifySettings]
-) -> Iterator[Evaluate]:
-    """Evaluates sets of parameters, in this process or in spawned ones with a thread each."""
-    workers = min(workers, os.cpu_count() or 1)
-    if workers < 2:
-        search = Search(*parts)
-        yield lambda xs: [search(x) for x in xs]
-        return
-    with (
-        one_thread(),
-        get_context("spawn").Pool(workers, _start_worker, (parts,)) as pool,  # ends them, always
-    ):
-        yield lambda xs: pool.map_async(_run_worker, xs, chunksize=1).get(TIMEOUT)

@@ -39,14 +39,14 @@ def _samples(run: Run, table: Path, samples: int, seed: int, jobs: int, resume: 
     from ..studies import sagging_block as block
     from ..studies import sagging_block_figure as figure
     from ..studies import sagging_block_samples as many
-    from ..studies import workers
+    from ..workers import available
 
     if samples < 1 or jobs < 0 or seed < 0:
         raise InputError(
             "--samples must be at least 1, --seed and --jobs at least 0 (0 jobs: one a processor), "
             f"got {samples}, {seed} and {jobs}."
         )
-    begin, jobs = time.monotonic(), jobs or workers.available()
+    begin, jobs = time.monotonic(), jobs or available()
     reference = block.Block()  # compiles, where that is still to be done, before the workers ask
     journal, seconds = many.run(
         table, samples, seed, jobs, resume, lambda share: run.progress("sagging-block", share)

@@ -13,9 +13,12 @@ import click
 
 from ..choices import METHODS, SOLVERS, STATES
 from ..errors import ConvergenceError, InputError
+from ..profile import phase
+from . import _profile
 from ._run import Run, command
 
 if TYPE_CHECKING:
+    from ..body import Body
     from ..state import Rest
 
 Work = TypeVar("Work", bound=Callable[..., Any])
@@ -50,6 +53,7 @@ def _choice(name: str, choices: tuple[str, ...], meaning: str) -> Callable[[Work
 )
 @click.option("--check-overlap", is_flag=True, help="Refuse a rest shape that lies in itself.")
 @click.option("--allow-energy-files", is_flag=True, help="Compile energy files that CASE names.")
+@_profile.option
 @click.option("--unit", help="Of the coordinates in MESH: m, mm, cm, ….")
 @click.option("--element", help="Cells to keep of a MESH with several kinds: P1, Q1, ….")
 @click.option("--law", help="Name of an energy or path of an energy file; default neo_hookean.")
@@ -84,6 +88,7 @@ def rest_shape(
     check: bool,
     check_overlap: bool,
     allow_energy_files: bool,
+    profiled: bool,
     **mesh_options: Any,
 ) -> None:
     r"""Find the shape without loads of a body that is given as loaded.
@@ -102,14 +107,8 @@ def rest_shape(
     Where there is no rest shape it exits with 3 and writes failure.json, failure.vtu and
     failure.png instead: the last equilibrium on the way, with the worst cells marked.
     """  # fmt: skip
-    from . import _failure, _report
-    from ._body_case import read_body
-
     run.out_or(Path("out") / loaded.stem)
     run.progress("reading")
-    case, allowed = _case(loaded, mesh_options, allow_energy_files)
-    body, settings = read_body(case, allow_energy_files=allowed)
-    run.progress("compiling")
     asked: dict[str, Any] = {
         "method": method,
         "density_of": density_of,
@@ -117,6 +116,27 @@ def rest_shape(
         "solver": solver,
         "check_overlap": check_overlap,
     }
+    with _profile.collecting(profiled) as profile:
+        with phase("imports"):
+            from . import _report
+            from ._body_case import read_body
+        with phase("reading"):
+            case, allowed = _case(loaded, mesh_options, allow_energy_files)
+            body, settings = read_body(case, allow_energy_files=allowed)
+        rest = _found(run, body, asked, settings)
+        with phase("writing"):
+            _report.equilibrium(run, rest, body.mesh, "rest.vtu")
+            rest.write_loaded(run.path("loaded.vtu"))
+        if check:
+            _check(run, rest, settings)
+    _profile.report(run, profile, rest)
+
+
+def _found(run: Run, body: Body, asked: dict[str, Any], settings: dict[str, Any]) -> Rest:
+    """The rest shape; where there is none, what is left of the search is written."""
+    from . import _failure, _report
+
+    run.progress("compiling")
     watch = _report.progress(run, "rest shape")
     try:
         rest = body.rest_shape(progress=watch, **asked, **settings)
@@ -124,11 +144,11 @@ def rest_shape(
         _failure.leave(run, error, body.mesh)
         raise
     run.replaces(_failure.FILES)
-    run.result |= asked | {"approximate": method == "reversed-gravity", "size_m": body.mesh.size}
-    _report.equilibrium(run, rest, body.mesh, "rest.vtu")
-    rest.write_loaded(run.path("loaded.vtu"))
-    if check:
-        _check(run, rest, settings)
+    run.result |= asked | {
+        "approximate": asked["method"] == "reversed-gravity",
+        "size_m": body.mesh.size,
+    }
+    return rest
 
 
 def _case(loaded: Path, mesh_options: dict[str, Any], allow_energy_files: bool) -> tuple[Any, bool]:

@@ -7,6 +7,8 @@ from pathlib import Path
 import click
 
 from ..choices import SYMMETRIC_SOLVERS
+from ..profile import phase
+from . import _profile
 from ._run import Run, command
 
 
@@ -20,7 +22,8 @@ from ._run import Run, command
     help="Of the linear equations; result.json says which auto took and why.",
 )
 @click.option("--allow-energy-files", is_flag=True, help="Compile energy files that CASE names.")
-def solve(run: Run, case: Path, solver: str, allow_energy_files: bool) -> None:
+@_profile.option
+def solve(run: Run, case: Path, solver: str, allow_energy_files: bool, profiled: bool) -> None:
     r"""Solve for the deformed shape of the body in CASE, a TOML file.
 
     Writes deformed.vtu and result.json to --out (default: out/ and the name of CASE). Tables of a
@@ -46,14 +49,18 @@ def solve(run: Run, case: Path, solver: str, allow_energy_files: bool) -> None:
           = [0, 4, 17]                   ids
           = { z = "max", x = [0, 0.1] }  a place: an end, a coordinate, an interval
     """
-    from ..case import read_case
-    from . import _report
-    from ._body_case import read_body
-
     run.out_or(Path("out") / case.stem)
     run.progress("reading")
-    body, settings = read_body(read_case(case), allow_energy_files=allow_energy_files)
-    run.progress("compiling")
-    progress = _report.progress(run, "solving")
-    state = body.solve(solver=solver, progress=progress, **settings)
-    _report.equilibrium(run, state, body.mesh, "deformed.vtu")
+    with _profile.collecting(profiled) as profile:
+        with phase("imports"):
+            from ..case import read_case
+            from . import _report
+            from ._body_case import read_body
+        with phase("reading"):
+            body, settings = read_body(read_case(case), allow_energy_files=allow_energy_files)
+        run.progress("compiling")
+        progress = _report.progress(run, "solving")
+        state = body.solve(solver=solver, progress=progress, **settings)
+        with phase("writing"):
+            _report.equilibrium(run, state, body.mesh, "deformed.vtu")
+    _profile.report(run, profile, state)

@@ -8,14 +8,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from . import workers
+from ..workers import Workers
 from .journal import Journal
 from .sagging_block import BAR, NO_FORWARD, SOLVED, Block, Outcome, draw
 
@@ -48,11 +47,13 @@ def run(
     _require_same(journal, drawn, seed)
     todo = [(n, *drawn[n]) for n in range(samples) if n not in journal.rows]
     seconds = []
-    for number, mu, lmbda, outcome in workers.results(_one, todo, jobs, _start):
-        journal.append(_row(number, seed, mu, lmbda, outcome))
-        seconds.append(outcome.cpu_seconds)
-        if progress:
-            progress(len(journal.rows) / samples)
+    with Workers(jobs, _sampler) as pool:
+        for task, outcome in pool.answers([at for _, *at in todo]):
+            number, mu, lmbda = todo[task]
+            journal.append(_row(number, seed, mu, lmbda, outcome))
+            seconds.append(outcome.cpu_seconds)
+            if progress:
+                progress(len(journal.rows) / samples)
     return journal, seconds
 
 
@@ -67,17 +68,9 @@ def _require_same(journal: Journal, drawn: list[list[float]], seed: int) -> None
             )
 
 
-@cache
-def _block() -> Block:
-    return Block()
-
-
-def _start() -> None:
-    _block()
-
-
-def _one(number: int, mu: float, lmbda: float) -> tuple[int, float, float, Outcome]:
-    return number, mu, lmbda, _block().run(mu, lmbda)
+def _sampler() -> Callable[[list[float]], Outcome]:
+    block = Block()
+    return lambda at: block.run(*at)
 
 
 def _row(number: int, seed: int, mu: float, lmbda: float, o: Outcome) -> list[object]:
