@@ -29,6 +29,7 @@ class Code:
     also: dict[str, Any] = field(default_factory=dict)
     ours: bool = False
     foreign: bool = True  # another interpreter, which our PYTHONPATH would mislead
+    threads: int | None = None  # of OpenMP; as the environment says if None
     process: subprocess.Popen[str] | None = None
     errors: IO[str] | None = None
 
@@ -37,7 +38,10 @@ class Code:
         environment = dict(os.environ)
         if self.foreign:
             environment.pop("PYTHONPATH", None)
-        self.errors = stack.enter_context(tempfile.TemporaryFile("w+"))
+        if self.threads:
+            environment["OMP_NUM_THREADS"] = str(self.threads)
+        self.errors = tempfile.TemporaryFile("w+")  # noqa: SIM115: closed by the stack
+        stack.enter_context(self.errors)
         self.process = subprocess.Popen(
             self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors,
             text=True, env=environment,
@@ -81,11 +85,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def assemble(given: argparse.Namespace, stack: ExitStack) -> tuple[list[Code], list[str]]:
     """All codes that are there, started, and why the others are not."""
+    ours = [sys.executable, str(HERE / "supple_newton.py")]
     codes = [
-        Code(f"Supple, {solver}", [sys.executable, script("supple")], {"solver": solver}, True,
-             foreign=False)
+        Code(f"Supple, {solver}", ours, {"solver": solver}, ours=True, foreign=False)
         for solver in SOLVERS
-    ]  # fmt: skip
+    ]
     absent = []
     for name, option, make in (
         ("DOLFINx", given.dolfinx, dolfinx),
@@ -111,11 +115,12 @@ def script(name: str) -> str:
 def dolfinx(python: Path) -> list[Code]:
     """On one rank and on two, with MUMPS' LDLᵀ: faster than its LU; its LLᵀ may give NaN on two."""
     one = [str(python), script("dolfinx")]
-    codes = [Code(REFERENCE, one, {"factor": "ldlt"})]
+    codes = [Code(REFERENCE, one, {"factor": "ldlt"}, threads=1)]
     beside = python.parent / "mpirun"
     mpirun = str(beside) if beside.exists() else shutil.which("mpirun")
     if mpirun and (os.cpu_count() or 1) > 1:
-        codes.append(Code("DOLFINx, 2 ranks", [mpirun, "-np", "2", *one], {"factor": "ldlt"}))
+        two = [mpirun, "-np", "2", *one]
+        codes.append(Code("DOLFINx, 2 ranks", two, {"factor": "ldlt"}, threads=1))
     return codes
 
 

@@ -26,8 +26,8 @@ _HEAD = """<?xml version="1.0" encoding="ISO-8859-1"?>
   <linear_solver type="pardiso"/>
  </solver>
 </Control>
-<Material><material id="1" name="m" type="{law}"><density>1</density><E>{young!r}</E><v>{poisson!r}</v>
-</material></Material>
+<Material><material id="1" name="m" type="{law}">
+<density>1</density><E>{young!r}</E><v>{poisson!r}</v></material></Material>
 """
 
 _TAIL = """<MeshDomains>
@@ -38,7 +38,8 @@ _TAIL = """<MeshDomains>
 <traction>0,{traction!r},0</traction><linear>1</linear></surface_load></Loads>
 <LoadData><load_controller id="1" type="loadcurve"><interpolate>LINEAR</interpolate>
 <points><pt>0,0</pt><pt>1,1</pt></points></load_controller></LoadData>
-<Output><logfile><node_data data="ux;uy;uz" delim=" " file="case.disp"></node_data></logfile></Output>
+<Output><logfile>
+<node_data data="ux;uy;uz" delim=" " file="case.disp"></node_data></logfile></Output>
 </febio_spec>
 """
 

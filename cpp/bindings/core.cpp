@@ -7,4 +7,5 @@ PYBIND11_MODULE(_core, module) {
   bind_system(module);
   bind_closest_point(module);
   bind_blas(module);
+  bind_linear(module);
 }

@@ -22,3 +22,4 @@ inline supple::Connectivity connectivity(const CellArray& cells) {
 void bind_system(py::module_& module);
 void bind_closest_point(py::module_& module);
 void bind_blas(py::module_& module);
+void bind_linear(py::module_& module);
