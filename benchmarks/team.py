@@ -40,7 +40,7 @@ class Code:
             environment.pop("PYTHONPATH", None)
         if self.threads:
             environment["OMP_NUM_THREADS"] = str(self.threads)
-        self.errors = tempfile.TemporaryFile("w+")  # noqa: SIM115: closed by the stack
+        self.errors = tempfile.TemporaryFile("w+")  # noqa: SIM115
         stack.enter_context(self.errors)
         self.process = subprocess.Popen(
             self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors,

@@ -71,6 +71,7 @@ def measure(case: str, make: Callable[[], supple.Body], most: int, repeats: int)
     chosen = counts(most)
     rounds: dict[int, list[dict[str, float]]] = {n: [] for n in chosen}
     difference = dict.fromkeys(chosen, 0.0)
+    solve(make, 1)
     for _ in range(repeats):
         answers = {}
         for n in chosen:
