@@ -31,9 +31,8 @@ test-cpp: .venv/.built ## the C++ tests, optimised and under the address and beh
 	  cmake --preset $$preset && cmake --build --preset $$preset && ctest --preset $$preset || exit 1; \
 	done
 
-bench: .venv/.built .venv/.dev ## the benchmarks
-	$(BIN)/python benchmarks/run.py
-	$(BIN)/python benchmarks/rest_shape.py
+bench: .venv/.built .venv/.dev ## the benchmarks, into benchmarks/results.md; peers by BENCH="--dolfinx …"
+	$(BIN)/python benchmarks/run.py $(BENCH)
 
 lint: .venv/.dev ## style and types, nothing is changed
 	$(BIN)/ruff check .

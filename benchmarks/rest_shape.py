@@ -20,22 +20,23 @@ from typing import Any
 
 import numpy as np
 import output
+from bodies import block, cantilever
 
 import supple
 
 #: Case → body. Cantilever: the benchmark's, 80 × 15 × 15 m under a dead traction on its end. Block:
 #: a cube of 0.1 m and 1 kPa on its base, leaning under its weight.
 CASES: dict[str, Callable[[], supple.Body]] = {
-    "cantilever P1, 10,000": lambda: cantilever((44, 8, 8), "P1"),
-    "cantilever P2, 10,000": lambda: cantilever((15, 5, 5), "P2"),
-    "cantilever mixed, 10,000": lambda: cantilever((15, 5, 5), "P2", mixed=True),
+    "cantilever P1, 10,000": lambda: cantilever("P1", (44, 8, 8)),
+    "cantilever P2, 10,000": lambda: cantilever("P2", (15, 5, 5)),
+    "cantilever mixed, 10,000": lambda: cantilever("P2", (15, 5, 5), mixed=True),
     "block P1, 10,000": lambda: block(14, "P1"),
     "block P2, 10,000": lambda: block(7, "P2"),
     "block mixed, 10,000": lambda: block(7, "P2", mixed=True),
 }
 LARGE: dict[str, Callable[[], supple.Body]] = {
-    "cantilever P1, 100,000": lambda: cantilever((95, 18, 18), "P1"),
-    "cantilever P2, 100,000": lambda: cantilever((46, 9, 9), "P2"),
+    "cantilever P1, 100,000": lambda: cantilever("P1", (95, 18, 18)),
+    "cantilever P2, 100,000": lambda: cantilever("P2", (46, 9, 9)),
 }
 #: Most that the inverse may cost, in forward solves: by dofs and formulation.
 BARS = {"10,000": 1.3, "100,000": 2.0, "mixed": 2.0}
@@ -60,29 +61,6 @@ class Row:
     iterations: tuple[int, int]
     factorisations: tuple[int, int]
     krylov_iterations: int
-
-
-def cantilever(cells: tuple[int, int, int], element: str, mixed: bool = False) -> supple.Body:
-    """Clamped at x = 0, (0, -10, 0) Pa on x = 80."""
-    mesh = supple.Mesh.box(cells, (80.0, 15.0, 15.0), element)
-    body = soft(mesh, 3e3, mixed, 0.0)
-    return body.fix(lambda x: x[:, 0] < 1e-9).traction(
-        lambda x: x[:, 0] > 80.0 - 1e-9, (0.0, -10.0, 0.0)
-    )
-
-
-def block(cells: int, element: str, mixed: bool = False) -> supple.Body:
-    """Fixed at z = 0; gravity draws it upwards and sideways."""
-    mesh = supple.Mesh.box((cells,) * 3, (0.1,) * 3, element)
-    return soft(mesh, 1e3, mixed, 1e3).fix(lambda x: x[:, 2] < 1e-9).gravity((0.0, 0.5, 1.0))
-
-
-def soft(mesh: supple.Mesh, young: float, mixed: bool, density: float) -> supple.Body:
-    """Neo-Hookean; the mixed body with a bulk modulus of a hundred shear moduli."""
-    if not mixed:
-        return supple.Body(mesh, "neo_hookean", density=density, young=young, poisson=0.3)
-    values = {"mu": young / 3, "bulk": 100 * young / 3}
-    return supple.Body(mesh, "neo_hookean_isochoric", "mixed", density=density, **values)
 
 
 def timed(call: Callable[[], Any]) -> tuple[float, Any]:

@@ -8,4 +8,5 @@ PYBIND11_MODULE(_core, module) {
   bind_closest_point(module);
   bind_blas(module);
   bind_multigrid(module);
+  bind_linear(module);
 }

@@ -26,3 +26,4 @@ void bind_system(py::module_& module);
 void bind_closest_point(py::module_& module);
 void bind_blas(py::module_& module);
 void bind_multigrid(py::module_& module);
+void bind_linear(py::module_& module);
