@@ -155,7 +155,8 @@ SUPPLE_INLINE supple_powi(vec x, int n) {
     vec r = supple_all(1.0);
     for (unsigned left = n < 0 ? 0u - (unsigned)n : (unsigned)n; left; left >>= 1, x *= x)
         if (left & 1u) r *= x;
-    return n < 0 ? 1.0 / r : r;
+    if (n < 0) r = 1.0 / r;
+    return r;
 }
 
 /* x^(-1/3) to an ulp or so for normal x > 0: a linear start on the upper half of the bits, right to
@@ -207,6 +208,66 @@ SUPPLE_INLINE supple_pow_thirds(vec x, int k) {
     return supple_choose((x > 0.0) & (x < inf), supple_choose(h < inf, h + l, h), special);
 }
 
+/* e^|x|/2, which overflows where sinh and cosh do. */
+SUPPLE_INLINE supple_half_exp(vec size) {
+    const double ln2 = 0x1.62e42fefa39efp-1, rest = 0x1.abc9e3b39803fp-56;
+    const vec high = size - ln2;
+    return supple_exp_of_sum(high, ((size - high) - ln2) - rest);
+}
+
+SUPPLE_CALLED supple_cosh(vec x) {
+    const vec half = supple_half_exp(supple_abs(x));
+    return half + 0.25 / half;
+}
+
+/* Below 1 the odd series, near-minimax to 2^-61, where the difference of exponentials cancels. */
+SUPPLE_CALLED supple_sinh(vec x) {
+    const vec size = supple_abs(x), z = x * x, z2 = z * z;
+    const vec p01 = 0x1.111111111104p-7 * z + 0x1.5555555555556p-3;
+    const vec p23 = 0x1.71de3a4058655p-19 * z + 0x1.a01a01a0318c3p-13;
+    const vec p45 = 0x1.6118e07ffded2p-33 * z + 0x1.ae646b4b21f1bp-26;
+    const vec p = (p01 + z2 * p23) + z2 * z2 * (p45 + z2 * 0x1.b52e61175a1d4p-41);
+    const vec half = supple_half_exp(size), large = half - 0.25 / half;
+    const vec signed_large = (vec)((bits)large | ((bits)x & (UINT64_C(1) << 63)));
+    return supple_choose(size < 1.0, x + x * z * p, signed_large);
+}
+
+/* sin(x + turn π/2) for |x| < 2^19: x = n π/2 + r with π/2 in three parts (Cody and Waite 1980),
+   r in two doubles, and the two series on |r| <= π/4, near-minimax to 2^-57.9 and 2^-64. */
+SUPPLE_INLINE supple_sine(vec x, unsigned turn) {
+    const double shift = 0x1.8p52;
+    const vec counted = x * 0x1.45f306dc9c883p-1 + shift, n = counted - shift;
+    const vec t = x - n * 0x1.921fb544p+0, part = n * 0x1.0b4611ap-34;
+    const vec head = t - part, back = head - t;
+    const vec lost = ((t - (head - back)) - (part + back)) - n * 0x1.898cc51701b84p-64;
+    const vec r = head + lost, r_low = (head - r) + lost, z = r * r, z2 = z * z;
+    const vec s01 = 0x1.111111110f775p-7 * z - 0x1.5555555555548p-3;
+    const vec s23 = 0x1.71de3563063a5p-19 * z - 0x1.a01a019bf64fap-13;
+    const vec s45 = 0x1.5d8f1f3f89e72p-33 * z - 0x1.ae5e57a5f7feap-26;
+    const vec sine = r + (r_low + r * z * (s01 + z2 * (s23 + z2 * s45)));
+    const vec c01 = 0x1.555555555554bp-5 - 0x1.6c16c16c15046p-10 * z;
+    const vec c23 = 0x1.a01a019c9697fp-16 - 0x1.27e4f7f80e871p-22 * z;
+    const vec c45 = 0x1.1ee9e0a72f418p-29 - 0x1.8fa9264b27f3cp-37 * z;
+    const vec first = 1.0 - 0.5 * z;
+    const vec tail = z2 * (c01 + z2 * (c23 + z2 * c45)) - r * r_low;
+    const vec cosine = first + (((1.0 - first) - 0.5 * z) + tail);
+    const bits quarter = (bits)counted + turn;
+    const vec y = supple_choose((mask)(quarter & 1) != 0, cosine, sine);
+    return (vec)((bits)y ^ ((quarter & 2) << 62));
+}
+
+/* Larger arguments, NaN and infinity go to the C library, all lanes of the call. */
+#define SUPPLE_SINE(name, turn)                                          \
+    SUPPLE_CALLED supple_##name(vec x) {                                 \
+        int far = 0;                                                     \
+        SUPPLE_EACH far |= !(__builtin_fabs(x[lane]) < 0x1p19);          \
+        if (!far) return supple_sine(x, turn);                           \
+        SUPPLE_EACH x[lane] = name(x[lane]);                             \
+        return x;                                                        \
+    }
+SUPPLE_SINE(sin, 0)
+SUPPLE_SINE(cos, 1)
+
 /* Rarely called: lane by lane through the C library. */
 #define SUPPLE_BY_LANES(name)                                 \
     SUPPLE_CALLED supple_##name(vec x) {                    \
@@ -218,14 +279,10 @@ SUPPLE_INLINE supple_pow_thirds(vec x, int k) {
         SUPPLE_EACH x[lane] = name(x[lane], y[lane]);         \
         return x;                                             \
     }
-SUPPLE_BY_LANES(sin)
-SUPPLE_BY_LANES(cos)
 SUPPLE_BY_LANES(tan)
 SUPPLE_BY_LANES(asin)
 SUPPLE_BY_LANES(acos)
 SUPPLE_BY_LANES(atan)
-SUPPLE_BY_LANES(sinh)
-SUPPLE_BY_LANES(cosh)
 SUPPLE_BY_LANES(tanh)
 SUPPLE_BY_LANES(erf)
 SUPPLE_BY_LANES_2(atan2)
