@@ -113,7 +113,7 @@ ARGUMENTS = {
     "sin": [uniform(-7, 7), uniform(-1e4, 1e4), decades(-320, 300)],
 }  # fmt: skip
 EXACT = {"acos": np.arccos}
-BOUND = {"exp": 0.8, "log": 0.9, "sqrt": 0.501, "sinh": 2.0, "cosh": 2.0}
+BOUND = {"exp": 0.8, "log": 0.9, "sqrt": 0.501, "sinh": 1.6, "cosh": 1.2}
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)
