@@ -1,9 +1,9 @@
 /* Mathematical functions of LANES numbers at once, for generated kernels.
  *
- * GCC/Clang vector extensions, no intrinsics and no tables, so that every lane goes the same way and
- * none sees another. Worst errors that tests/kernels/test_vector_math.py holds, in units of the last
+ * GCC/Clang vector extensions, no intrinsics and no tables: every lane goes the same way, and none
+ * sees another. Worst errors that tests/kernels/test_vector_math.py holds, in units of the last
  * place (ulp) of the exact result:
- *     supple_exp 0.8, supple_log 0.9, supple_pow 0.8, supple_pow_thirds 0.55
+ *     supple_exp 0.8, supple_log 0.9, supple_pow 0.8, supple_pow_thirds 0.55 (1 without FMA)
  *     supple_sin, supple_cos, supple_acos 1, supple_sinh 1.6, supple_cosh 1.2
  *     supple_powi(x, n) |n|, 1/2 for n = 2 and -1; supple_sqrt 1/2; supple_abs, _min, _max exact
  *     tan, asin, atan, tanh, erf, atan2: the C library's, lane by lane
@@ -35,10 +35,14 @@ SUPPLE_INLINE supple_sqrt(vec x) {
     return x;
 }
 
+#if defined(__FP_FAST_FMA) || defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+#define SUPPLE_FUSED
+#endif
+
 /* c - a b in (nearly) one rounding. Without a fused operation by Dekker (1971), Numer. Math. 18,
    whose products of halves are exact; there nothing can be contracted. */
 SUPPLE_INLINE supple_residual(vec c, vec a, vec b) {
-#if defined(__FP_FAST_FMA) || defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+#ifdef SUPPLE_FUSED
     SUPPLE_EACH c[lane] = __builtin_fma(-a[lane], b[lane], c[lane]);
     return c;
 #else
@@ -48,9 +52,27 @@ SUPPLE_INLINE supple_residual(vec c, vec a, vec b) {
 #endif
 }
 
+/* Lane by lane through the C library. */
+#define SUPPLE_BY_LANES(name)                         \
+    SUPPLE_CALLED supple_##name(vec x) {              \
+        SUPPLE_EACH x[lane] = name(x[lane]);          \
+        return x;                                     \
+    }
+#define SUPPLE_BY_LANES_2(name)                       \
+    SUPPLE_CALLED supple_##name(vec x, vec y) {       \
+        SUPPLE_EACH x[lane] = name(x[lane], y[lane]); \
+        return x;                                     \
+    }
+SUPPLE_BY_LANES(tan)
+SUPPLE_BY_LANES(asin)
+SUPPLE_BY_LANES(atan)
+SUPPLE_BY_LANES(tanh)
+SUPPLE_BY_LANES(erf)
+SUPPLE_BY_LANES_2(atan2)
+
 /* exp(x + tail) for a tail below an ulp of 1e3: x + tail = n ln 2 + r after Cody and Waite (1980)
    with the rounding of r carried along; exp(r) = 1 + r + r² P(r), P near-minimax on |r| <= ln(2)/2
-   to 2^-57.6; 2^n in two factors, the first of which loses nothing where the result is subnormal. */
+   to 2^-57.6; 2^n in two factors, the first of which never makes a subnormal number. */
 SUPPLE_INLINE supple_exp_of_sum(vec x, vec tail) {
     const double shift = 0x1.8p52 + 1022;
     x = supple_choose(x > 710.0, supple_all(710.0), x);
@@ -92,7 +114,7 @@ SUPPLE_INLINE supple_log_anywhere(vec x, vec regular) {
 }
 
 /* With s = f/(2 + f): ln(1 + f) = 2 atanh s = f - f²/2 + s (f²/2 + R(s²)), where f is exact; the
-   series' tail R near-minimax to 2^-59.4. Source: Tang (1990), ACM TOMS 16(4), without his table. */
+   series' tail R near-minimax to 2^-59.4. After Tang (1990), ACM TOMS 16(4), without his table. */
 SUPPLE_CALLED supple_log(vec x) {
     vec k;
     const vec f = supple_split(x, &k);
@@ -105,6 +127,7 @@ SUPPLE_CALLED supple_log(vec x) {
     return supple_log_anywhere(x, k * 0x1.62e42fefa38p-1 - ((half - low) - f));
 }
 
+#ifdef SUPPLE_FUSED
 /* ln x = the result + *low, to 2^-67 of it: the same series, its quotient and leading terms in two
    doubles (Dekker 1971). */
 SUPPLE_INLINE supple_log_in_two(vec x, vec* low) {
@@ -150,15 +173,6 @@ SUPPLE_CALLED supple_pow(vec x, vec y) {
     return supple_choose(one, supple_all(1.0), r);
 }
 
-/* x^n for a literal n, by squaring. */
-SUPPLE_INLINE supple_powi(vec x, int n) {
-    vec r = supple_all(1.0);
-    for (unsigned left = n < 0 ? 0u - (unsigned)n : (unsigned)n; left; left >>= 1, x *= x)
-        if (left & 1u) r *= x;
-    if (n < 0) r = 1.0 / r;
-    return r;
-}
-
 /* x^(-1/3) to an ulp or so for normal x > 0: a linear start on the upper half of the bits, right to
    4 %, and two steps of the binomial series of (1 - h)^(-1/3), h = 1 - x y³. */
 SUPPLE_CALLED supple_rcbrt(vec x) {
@@ -186,7 +200,8 @@ SUPPLE_INLINE supple_pow_thirds(vec x, int k) {
     const vec y = supple_rcbrt(safe), rest = supple_rcbrt_rest(safe, y);
     const vec scale = supple_choose(tiny, supple_all(0x1p18), supple_all(1.0));
     vec h = supple_all(1.0), l = supple_all(0.0), base = y * scale, base_low = rest * scale;
-    for (unsigned left = k < 0 ? 0u - (unsigned)k : 2u - ((unsigned)k + 2u) % 3u; left; left >>= 1) {
+    unsigned left = k < 0 ? 0u - (unsigned)k : 2u - ((unsigned)k + 2u) % 3u;
+    for (; left; left >>= 1) {
         if (left & 1u) {
             const vec p = h * base;
             l = (h * base_low + l * base) - supple_residual(p, h, base);
@@ -206,6 +221,20 @@ SUPPLE_INLINE supple_pow_thirds(vec x, int k) {
                                      supple_all(__builtin_nan("")));
     const vec special = supple_choose(x == 0.0, k < 0 ? inf : zero, beyond);
     return supple_choose((x > 0.0) & (x < inf), supple_choose(h < inf, h + l, h), special);
+}
+
+#else /* two doubles a number take twice the C library's time without fused operations */
+SUPPLE_BY_LANES_2(pow)
+SUPPLE_INLINE supple_pow_thirds(vec x, int k) { return supple_pow(x, supple_all(k / 3.0)); }
+#endif
+
+/* x^n for a literal n, by squaring. */
+SUPPLE_INLINE supple_powi(vec x, int n) {
+    vec r = supple_all(1.0);
+    for (unsigned left = n < 0 ? 0u - (unsigned)n : (unsigned)n; left; left >>= 1, x *= x)
+        if (left & 1u) r *= x;
+    if (n < 0) r = 1.0 / r;
+    return r;
 }
 
 /* e^|x|/2, which overflows where sinh and cosh do. */
@@ -290,21 +319,3 @@ SUPPLE_CALLED supple_acos(vec x) {
     const vec far = 0x1.921fb54442d18p+1 - (twice - 0x1.1a62633145c07p-53);
     return supple_choose(inner, near, supple_choose(x < 0.0, far, twice));
 }
-
-/* Rarely called: lane by lane through the C library. */
-#define SUPPLE_BY_LANES(name)                                 \
-    SUPPLE_CALLED supple_##name(vec x) {                    \
-        SUPPLE_EACH x[lane] = name(x[lane]);                  \
-        return x;                                             \
-    }
-#define SUPPLE_BY_LANES_2(name)                               \
-    SUPPLE_CALLED supple_##name(vec x, vec y) {             \
-        SUPPLE_EACH x[lane] = name(x[lane], y[lane]);         \
-        return x;                                             \
-    }
-SUPPLE_BY_LANES(tan)
-SUPPLE_BY_LANES(asin)
-SUPPLE_BY_LANES(atan)
-SUPPLE_BY_LANES(tanh)
-SUPPLE_BY_LANES(erf)
-SUPPLE_BY_LANES_2(atan2)
