@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "supple/error.hpp"
 
@@ -18,10 +19,39 @@ Index group_size(Index cells, Index lanes) {
   return (size + lanes - 1) / lanes * lanes;
 }
 
+/// Doubles that begin at a multiple of SUPPLE_ALIGNMENT.
+class AlignedArray {
+ public:
+  void resize(std::size_t size) {
+    constexpr std::size_t kSpare = SUPPLE_ALIGNMENT / sizeof(double);
+    store_.assign(size + kSpare, 0.0);
+    size_ = size;
+    void* start = store_.data();
+    std::size_t room = store_.size() * sizeof(double);
+    start_ = static_cast<double*>(std::align(SUPPLE_ALIGNMENT, size * sizeof(double), start, room));
+  }
+  double* data() const { return start_; }
+  double* begin() const { return start_; }
+  double* end() const { return start_ + size_; }
+
+ private:
+  std::vector<double> store_;
+  std::size_t size_ = 0;
+  double* start_ = nullptr;
+};
+
+/// Fill the entries above the diagonal of symmetric matrices A (n × n)[lanes].
+void mirror(std::ptrdiff_t n, std::ptrdiff_t lanes, double* A) {
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    for (std::ptrdiff_t j = 0; j < i; ++j)
+      std::copy_n(A + (i * n + j) * lanes, lanes, A + (j * n + i) * lanes);
+  }
+}
+
 } // namespace
 
 struct KernelTerm::Buffers {
-  std::vector<double> A, w, x;
+  AlignedArray A, w, x;
 };
 
 KernelTerm::KernelTerm(std::shared_ptr<const KernelLibrary> library,
@@ -94,10 +124,11 @@ void KernelTerm::call(const supple_kernel& kernel, Index first, const ConstVecto
     const Index* node =
         cells_.data() + std::min<std::ptrdiff_t>(first + lane, cells_.rows() - 1) * all;
     for (std::ptrdiff_t i = 0; i < 3 * m; ++i) {
-      b.x[static_cast<std::size_t>(i * lanes + lane)] = points[3 * node[i / 3] + i % 3];
+      b.x.data()[i * lanes + lane] = points[3 * node[i / 3] + i % 3];
     }
   }
   kernel.call(b.A.data(), b.w.data(), b.x.data());
+  if (kernel.lower != 0) mirror(kernel.rows, lanes, b.A.data());
 }
 
 template <class Consume>

@@ -1,4 +1,4 @@
-"""kernels/simd/math.h: accurate in every lane, and no lane sees another.
+"""kernels/simd/math.h and angles.h: accurate in every lane, and no lane sees another.
 
 Exact answers are the C library's in extended precision (numpy.longdouble, 11 bits more), which is
 itself held to the decimal module's forty digits.
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from supple import kernels
 from supple.kernels import build
+from supple.kernels.simd.lanes import TYPES, functions
 
 LONG = np.longdouble
 pytestmark = pytest.mark.skipif(
@@ -60,16 +60,14 @@ class Library:
     """The header compiled for some lanes, called on arrays of any length."""
 
     def __init__(self, folder: Path, lanes: int, target: str) -> None:
-        header = Path(kernels.__file__).parent / "simd" / "math.h"
+        header = f"#define LANES {lanes}\n#define SUPPLE_ALIGNMENT 64\n{TYPES}{functions()}"
         calls = {name: f"supple_{name}(x)" for name in ONE}
         calls |= {name: f"supple_{name}(x, y)" for name in TWO}
         calls |= {f"third_{i}": f"supple_pow_thirds(x, {k})" for i, k in enumerate(THIRDS)}
         calls |= {f"power_{i}": f"supple_powi(x, {n})" for i, n in enumerate(POWERS)}
         loops = "".join(_LOOP.format(name=f"all_{n}", call=c) for n, c in calls.items())
         includes = "".join(f"#include <{h}.h>\n" for h in ("math", "stdint", "string"))
-        text = (
-            f"{includes}#define LANES {lanes}\n{header.read_text(encoding='utf-8')}{_FUSED}{loops}"
-        )
+        text = f"{includes}{header}{_FUSED}{loops}"
         (folder / "math.c").write_text(text, encoding="utf-8")
         flags = [*build.OPTIMISATION, target, "-std=c17", "-shared", "-fPIC", "-Wall", "-Wextra"]
         command = [build._compiler(), *flags, "-Wno-psabi", "-Werror", "math.c", "-o", "math.so"]
