@@ -3,23 +3,26 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
-#include <new>
 
 #include "supple/error.hpp"
 
 namespace supple {
 
-/// Large arrays that need no first value, and whose pages are kept from one use to the next.
-class Array {
+/// Large arrays of numbers, aligned to 64 bytes, that need no first value, and whose pages are kept
+/// from one use to the next.
+template <class T>
+class ArrayOf {
  public:
   /// Room for `size` numbers; what was there before is lost where it has to grow.
   /// @throws NumericalError if there is no memory.
-  double* sized(std::int64_t size) {
+  T* sized(std::int64_t size) {
     if (size > size_) {
       values_.reset();
       size_ = 0;
-      values_.reset(new (std::nothrow) double[static_cast<std::size_t>(size)]);
+      const std::size_t bytes = static_cast<std::size_t>(size) * sizeof(T);
+      values_.reset(static_cast<T*>(std::aligned_alloc(kAlign, (bytes / kAlign + 1) * kAlign)));
       if (!values_)
         throw NumericalError(
             "the factorisation ran out of memory; use a coarser mesh or a lower order");
@@ -27,11 +30,17 @@ class Array {
     }
     return values_.get();
   }
-  double* get() const { return values_.get(); }
+  T* get() const { return values_.get(); }
 
  private:
-  std::unique_ptr<double[]> values_;
+  static constexpr std::size_t kAlign = 64;
+  struct Free {
+    void operator()(T* values) const { std::free(values); }
+  };
+  std::unique_ptr<T, Free> values_;
   std::int64_t size_ = 0;
 };
+
+using Array = ArrayOf<double>;
 
 } // namespace supple

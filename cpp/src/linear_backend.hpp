@@ -30,5 +30,6 @@ class Backend {
 std::unique_ptr<Backend> make_cholmod(Kind kind);
 std::unique_ptr<Backend> make_umfpack();
 std::unique_ptr<Backend> make_supernodal(Kind kind);
+std::unique_ptr<Backend> make_cholesky(Precision precision);
 
 } // namespace supple

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "cholmod_library.hpp"
+#include "strips.hpp"
 #include "suitesparse.hpp"
 #include "supple/error.hpp"
 
@@ -23,6 +24,7 @@ struct Builder {
   SupernodeTree& tree;
   const CscPattern& pattern;
   bool both;
+  Index lanes;
   std::vector<Index> column, owner; // of each unknown its column, of each column its supernode
 
   void read(const cholmod_factor& f) {
@@ -49,13 +51,28 @@ struct Builder {
     tree.node.back().rows = static_cast<std::int64_t>(tree.row.size());
   }
 
+  Index strips_of(Index rows) const { return strips::whole(rows, lanes); }
+  /// Where an entry of the lower triangle lies in its panel.
+  std::int64_t offset(const Supernode& node, std::int64_t row, std::int64_t column) const {
+    const std::int64_t k = node.columns, m = node.below;
+    if (lanes == 0) return row + column * (k + m);
+    if (row >= k) row += static_cast<std::int64_t>(strips_of(node.columns)) * lanes - k;
+    return row / lanes * lanes * k + column * lanes + row % lanes;
+  }
+  std::int64_t update_entries(const Supernode& node) const {
+    const std::int64_t m = node.below;
+    return lanes > 0 ? strips::triangle(strips_of(node.below), lanes) : m * m;
+  }
+
   void lay_panels() {
     for (Supernode& node : tree.node) {
       node.panel = tree.panels;
       const std::int64_t k = node.columns, m = node.below;
-      tree.panels += k * (k + m) + (both ? k * m : 0);
+      tree.panels += lanes > 0 ? k * lanes * (strips_of(node.columns) + strips_of(node.below))
+                               : k * (k + m) + (both ? k * m : 0);
       tree.tallest_product = std::max({tree.tallest_product, k * m, k * k / 4});
-      if (k * (k + 2 * m) > std::numeric_limits<std::uint32_t>::max())
+      if (std::max(k * (k + 2 * m), m * m) + (k + m) * lanes >
+          std::numeric_limits<std::uint32_t>::max())
         throw NumericalError("a front of the factor exceeds 2³² entries; use a coarser mesh");
     }
   }
@@ -132,7 +149,7 @@ struct Builder {
         const std::int64_t k = node.columns, m = node.below;
         const std::int64_t row = local[at(p.row)], column = p.column - node.first;
         tree.slot[e].target = static_cast<std::uint32_t>(
-            p.upper ? k * (k + m) + row - k + column * m : row + column * (k + m));
+            p.upper ? k * (k + m) + row - k + column * m : offset(node, row, column));
       }
     }
   }
@@ -194,18 +211,16 @@ struct Builder {
       Supernode& node = tree.node[at(s)];
       std::int64_t& own = top[odd[at(s)]];
       node.update = own;
-      own += static_cast<std::int64_t>(node.below) * node.below;
+      own += update_entries(node);
       peak = std::max(peak, top[0] + top[1]);
       for (Index c = tree.child_start[at(s)]; c < tree.child_start[at(s) + 1]; ++c) {
         const Supernode& child = tree.node[at(tree.child[at(c)])];
-        if (mine[at(tree.child[at(c)])] != 0)
-          top[!odd[at(s)]] -= static_cast<std::int64_t>(child.below) * child.below;
+        if (mine[at(tree.child[at(c)])] != 0) top[!odd[at(s)]] -= update_entries(child);
       }
     }
     for (const Index s : members) { // the odd stack grows downwards from the end
       Supernode& node = tree.node[at(s)];
-      const std::int64_t entries = static_cast<std::int64_t>(node.below) * node.below;
-      if (odd[at(s)] != 0) node.update = peak - node.update - entries;
+      if (odd[at(s)] != 0) node.update = peak - node.update - update_entries(node);
       node.update += tree.updates;
     }
     tree.updates += peak;
@@ -248,11 +263,11 @@ bool same(const CscPattern& a, const CscPattern& b) {
 
 } // namespace
 
-TreeReport make_tree(const CscPattern& pattern, int branches) {
+TreeReport make_tree(const CscPattern& pattern, int branches, Index lanes) {
   CholmodLibrary library(CHOLMOD_SUPERNODAL);
   library.analyse(pattern.lower ? pattern : symmetric_lower(pattern));
   TreeReport report{{}, library.flops, library.nonzeros, library.ordering};
-  Builder builder{report.tree, pattern, !pattern.lower, {}, {}};
+  Builder builder{report.tree, pattern, !pattern.lower, lanes, {}, {}};
   builder.read(*library.factor);
   builder.lay_panels();
   builder.link();
@@ -262,10 +277,12 @@ TreeReport make_tree(const CscPattern& pattern, int branches) {
   return report;
 }
 
-std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int branches) {
+std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int branches,
+                                              Index lanes) {
   struct Known {
     CscPattern pattern;
     int branches;
+    Index lanes;
     TreeReport report;
   };
   static std::mutex mutex;
@@ -274,10 +291,11 @@ std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int bra
   const std::lock_guard<std::mutex> lock(mutex);
   for (const std::weak_ptr<const Known>& one : known) {
     const std::shared_ptr<const Known> k = one.lock();
-    if (k && k->branches == branches && same(k->pattern, pattern)) return {k, &k->report};
+    if (k && k->branches == branches && k->lanes == lanes && same(k->pattern, pattern))
+      return {k, &k->report};
   }
-  const auto fresh =
-      std::make_shared<const Known>(Known{pattern, branches, make_tree(pattern, branches)});
+  const auto fresh = std::make_shared<const Known>(
+      Known{pattern, branches, lanes, make_tree(pattern, branches, lanes)});
   known[oldest++ % known.size()] = fresh;
   return {fresh, &fresh->report};
 }

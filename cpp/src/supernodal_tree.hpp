@@ -62,11 +62,13 @@ struct TreeReport {
 
 /// Analyse a pattern; of a full one that of A + Aᵀ, with room for U.
 /// @param branches how many independent subtrees to look for; 1 for none.
+/// @param lanes rows of a strip where panels and updates are laid out in strips, 0 for columns.
 /// @throws NumericalError out of memory, or a front of more than 2³² entries.
-TreeReport make_tree(const CscPattern& pattern, int branches);
+TreeReport make_tree(const CscPattern& pattern, int branches, Index lanes = 0);
 
 /// The same, or the one of a factor that lives and has the same pattern: a body's direct and
 /// inverse forms are analysed once.
-std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int branches);
+std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int branches,
+                                              Index lanes = 0);
 
 } // namespace supple

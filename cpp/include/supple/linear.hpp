@@ -11,6 +11,8 @@
 ///
 /// The multifrontal factors do not choose their pivots beyond a front. What that spoils, refinement
 /// repairs; where it does not, Factor falls back to UMFPACK, whose verdict and answer then count.
+/// In the same way a factor in single precision falls back to one in double: where a pivot is not
+/// positive, or where refinement does not reach what is asked.
 #pragma once
 
 #include <memory>
@@ -21,9 +23,15 @@ namespace supple {
 
 /// What is known about the matrix, by the origin of its terms and never by trial.
 enum class Kind {
-  Cholesky,      ///< symmetric positive definite: supernodal LLᵀ (CHOLMOD)
+  Cholesky,      ///< symmetric positive definite: multifrontal LLᵀ
   QuasiDefinite, ///< symmetric indefinite: multifrontal LDLᵀ without pivoting, refined
   Unsymmetric    ///< multifrontal LU with partial pivoting inside a front, refined
+};
+
+/// The numbers that a factor of kind Cholesky is kept in.
+enum class Precision {
+  Double,
+  Single ///< half the memory and time; `solve` refines by conjugate gradients in double
 };
 
 /// Which part of the reduced matrix a factor of this kind reads.
@@ -58,13 +66,14 @@ struct Refinement {
 struct SolveReport {
   double residual = 0.0; ///< ‖b − Ax‖₂ / ‖b‖₂ at the returned x; 0 where b = 0
   double backward = 0.0; ///< ‖b − Ax‖∞ / (‖A‖∞‖x‖∞ + ‖b‖∞)
-  int steps = 0;         ///< refinement steps kept
+  int steps = 0;         ///< refinement steps kept, or conjugate gradients
 };
 
 /// A factorisation of one kind; not to be used by two threads at once.
 class Factor {
  public:
-  explicit Factor(Kind kind);
+  /// @param precision of a factor of kind Cholesky; the others are always double.
+  explicit Factor(Kind kind, Precision precision = Precision::Double);
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
   ~Factor();
@@ -82,9 +91,10 @@ class Factor {
 
   /// x = A⁻¹ rhs, refined with the values of the last factorise.
   ///
-  /// Where refinement of a multifrontal factor ends neither at the tolerance (1e-12 at least) nor
-  /// at rounding, UMFPACK factorises the same values and the better answer is kept. With
-  /// `max_steps` = 0 the factor is taken as it is.
+  /// A factor in single precision is refined by conjugate gradients, at most 3·max_steps of them.
+  /// Where refinement of a factor without pivoting, or in single precision, ends neither at the
+  /// tolerance (1e-12 at least) nor at rounding, the reserve factorises the same values and the
+  /// better answer is kept. With `max_steps` = 0 the factor is taken as it is.
   /// @throws StateError unless the last factorise was ok; ShapeError on a wrong size.
   SolveReport solve(const ConstVector& rhs, MutableVector x, const Refinement& refinement = {});
 
@@ -96,9 +106,10 @@ class Factor {
   /// @throws StateError unless the kind is QuasiDefinite and the last factorise was ok.
   Inertia inertia() const;
 
-  /// The last factorise or solve had to fall back to UMFPACK.
+  /// The last factorise or solve had to fall back: to double precision, or to UMFPACK.
   bool fell_back() const;
 
+  Precision precision() const; ///< as asked for
   Kind kind() const;
   std::int64_t size() const;    ///< number of unknowns
   double flops() const;         ///< of one factorisation, as the analysis counts them

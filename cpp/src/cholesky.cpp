@@ -1,0 +1,297 @@
+/// Our own multifrontal LLᵀ in double or single precision, its fronts in strips of rows.
+///
+/// Duff and Reid (1983), ACM TOMS 9(3), for the fronts; the branches of the tree go to threads of
+/// their own, the fronts of its trunk are each shared by all. Every number is computed in the same
+/// order whatever their count is.
+#include <omp.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "array.hpp"
+#include "linear_backend.hpp"
+#include "strips.hpp"
+#include "supernodal_tree.hpp"
+#include "team.hpp"
+
+namespace supple {
+namespace {
+
+using strips::Run;
+
+constexpr double kWorthThreads = 1e8; // flops of a factorisation above which a second thread pays
+constexpr int kBranches = 4;          // shares for each thread
+constexpr Index kPanel = 128;         // columns that are eliminated together
+constexpr Index kRows = 192;          // rows whose part of a panel stays in the second cache
+
+std::size_t at(std::int64_t i) {
+  return static_cast<std::size_t>(i);
+}
+
+template <class T>
+class Cholesky final : public Backend {
+ public:
+  void analyse(const CscPattern& pattern) override {
+    pattern_ = &pattern;
+    const int threads = omp_get_max_threads();
+    analysis_ = shared_tree(pattern, threads > 1 ? kBranches * threads : 1, S);
+    lay_vectors();
+  }
+
+  FactorStatus factorise(double* values) override {
+    values_ = values;
+    scale_matrix();
+    factor_.sized(tree().panels + S * S);
+    updates_.sized(tree().updates);
+    failed_ = std::numeric_limits<Index>::max();
+    together([this](const Worker& worker) { factorise_shares(worker); });
+    if (failed_ == std::numeric_limits<Index>::max()) return {};
+    return {FactorStatus::Cause::NotPositiveDefinite, tree().order[at(failed_)]};
+  }
+
+  void solve(const double* rhs, double* x) override {
+    const double largest = scale_right_hand_side(rhs);
+    for (Index s = 0; s < tree().size(); ++s)
+      forward(s, rhs, 1.0 / largest);
+    for (Index s = tree().size() - 1; s >= 0; --s)
+      backward(s, x, scale_ * largest);
+  }
+
+  Inertia inertia() const override {
+    return {0, 0, static_cast<std::int64_t>(tree().order.size()), 1.0};
+  }
+  double flops() const override { return analysis_->flops; }
+  double nonzeros() const override { return analysis_->nonzeros; }
+  const char* ordering() const override { return analysis_->ordering; }
+
+ private:
+  const SupernodeTree& tree() const { return analysis_->tree; }
+  const Supernode& node(Index s) const { return tree().node[at(s)]; }
+  /// Strips of the diagonal block and of the rows below it.
+  Index wide(const Supernode& node) const { return strips::whole(node.columns, S); }
+  Index tall(const Supernode& node) const { return strips::whole(node.below, S); }
+  T* panel(const Supernode& node) const { return factor_.get() + node.panel; }
+  T* update(const Supernode& node) const { return updates_.get() + node.update; }
+  const Index* places(const Supernode& node) const { return tree().place.data() + node.rows; }
+
+  /// Where each supernode has its part of x and of what it owes to the rows below.
+  void lay_vectors() {
+    start_.clear();
+    std::int64_t end = 0;
+    tallest_ = widest_ = 0;
+    for (Index s = 0; s < tree().size(); ++s) {
+      start_.push_back(end);
+      end += (wide(node(s)) + tall(node(s))) * static_cast<std::int64_t>(S);
+      tallest_ = std::max(tallest_, tall(node(s)) * S);
+      widest_ = std::max(widest_, wide(node(s)) * S);
+    }
+    vector_.sized(end);
+    const auto threads = at(std::max(omp_get_max_threads(), 1));
+    work_.resize(threads);
+    offset_.resize(threads);
+    for (ArrayOf<T>& work : work_)
+      work.sized(static_cast<std::int64_t>(widest_) * S);
+    for (auto& offset : offset_)
+      offset.resize(at(4) * at(tallest_));
+  }
+
+  /// Powers of two keep the numbers inside the range of a float.
+  void scale_matrix() {
+    scale_ = 1.0;
+    if (sizeof(T) == sizeof(double)) return;
+    double largest = 0.0;
+    for (std::int64_t c = 0; c < pattern_->size; ++c)
+      largest = std::max(largest, std::abs(values_[pattern_->start[at(c)]])); // the diagonal
+    if (largest > 0.0) scale_ = std::exp2(-std::ilogb(largest));
+  }
+  double scale_right_hand_side(const double* rhs) const {
+    if (sizeof(T) == sizeof(double)) return 1.0;
+    double largest = 0.0;
+    for (std::int64_t i = 0; i < pattern_->size; ++i)
+      largest = std::max(largest, std::abs(rhs[i]));
+    return largest > 0.0 && std::isfinite(largest) ? std::exp2(std::ilogb(largest)) : 1.0;
+  }
+
+  /// Run `use` by all threads that are worth it.
+  template <class Use>
+  void together(const Use& use) {
+    const bool many = work_.size() > 1 && flops() > kWorthThreads && !omp_in_parallel();
+    if (!many) return use(Worker{});
+#pragma omp parallel num_threads(static_cast<int>(work_.size()))
+    {
+#pragma omp single
+      team_.reset(omp_get_num_threads());
+      use(Worker{omp_get_thread_num(), &team_});
+    }
+  }
+
+  void factorise_shares(const Worker& worker) {
+    worker.share(static_cast<int>(tree().branch.size()), [&](int b) {
+      const Range& range = tree().branch[at(b)];
+      for (Index s = range.begin; s < range.end && node(s).first < failed_; ++s)
+        front(s, Worker{worker.number, nullptr});
+    });
+    for (const Index s : tree().trunk) {
+      if (node(s).first >= failed_) return; // the same for all, for all have waited
+      front(s, worker);
+    }
+  }
+
+  /// Assemble and eliminate one supernode.
+  void front(Index s, const Worker& worker) {
+    const Supernode& f = node(s);
+    worker.once([&] { start_panel(s); });
+    for_children(s, [&](const Supernode& child) { add(child, f, true, worker); });
+    for (Index j = 0; j < f.columns; j += kPanel)
+      if (!eliminate(f, {j, std::min(j + kPanel, f.columns)}, worker)) return;
+    if (f.below == 0) return;
+    const T* const below = panel(f) + static_cast<std::int64_t>(wide(f)) * S * f.columns;
+    // The longest rows first: what is left for the end is short.
+    share_strips(worker, {0, tall(f)}, true,
+                 [&](Run strips) { kernels_.outer(update(f), below, f.columns, strips); });
+    for_children(s, [&](const Supernode& child) { add(child, f, false, worker); });
+  }
+
+  void start_panel(Index s) {
+    T* const to = panel(node(s));
+    std::fill(to, panel(tree().node[at(s) + 1]), T(0));
+    for (std::size_t e = node(s).slots; e < tree().node[at(s) + 1].slots; ++e) {
+      const Slot& slot = tree().slot[e];
+      to[slot.target] += static_cast<T>(values_[slot.source] * scale_);
+    }
+  }
+
+  /// The columns `run` of a front; false if they cannot be eliminated.
+  bool eliminate(const Supernode& f, Run run, const Worker& worker) {
+    const Run diagonal{run.begin / S, strips::whole(run.end, S)};
+    T* const to = panel(f);
+    worker.once([&] {
+      kernels_.update(to, f.columns, diagonal, run);
+      const Index column = kernels_.factor(to, f.columns, run);
+      if (column >= 0) fail(f.first + column);
+    });
+    if (f.first + run.end > failed_ && f.first <= failed_) return false;
+    share_strips(worker, {diagonal.end, wide(f) + tall(f)}, false, [&](Run strips) {
+      kernels_.update(to, f.columns, strips, run);
+      kernels_.divide(to, f.columns, strips, run);
+    });
+    return true;
+  }
+
+  void fail(Index column) {
+    Index lowest = failed_;
+    while (column < lowest && !failed_.compare_exchange_weak(lowest, column)) {
+    }
+  }
+
+  /// Add what a child leaves to the panel of its parent's front, or to its update.
+  void add(const Supernode& child, const Supernode& f, bool to_panel, const Worker& worker) {
+    const Index* const place = places(child);
+    const auto m = child.below;
+    const auto inside = static_cast<Index>(std::lower_bound(place, place + m, f.columns) - place);
+    if (to_panel ? inside == 0 : inside == m) return;
+    std::uint32_t* const row = offset_[at(worker.number)].data();
+    std::uint32_t* const column = row + 2 * tallest_;
+    const Index begin = to_panel ? 0 : inside, end = to_panel ? inside : m;
+    for (Index i = begin; i < end; ++i)
+      column[i] = static_cast<std::uint32_t>((place[i] - (to_panel ? 0 : f.columns)) * S);
+    for (Index i = begin; i < m; ++i)
+      row[i] = to_panel ? panel_row(f, place[i]) : update_row(place[i] - f.columns);
+    T* const to = to_panel ? panel(f) : update(f);
+    share_strips(worker, {begin / S, strips::whole(m, S)}, false, [&](Run strips) {
+      for (Index t = strips.begin; t < strips.end; ++t) {
+        const Index lanes = std::min<Index>(S, m - t * S);
+        const T* const from = update(child) + strips::triangle(t, S);
+        kernels_.scatter(to, row + t * S, column, from, {begin, std::min(end, t * S)}, {0, lanes});
+        for (Index j = std::max(begin, t * S); j < std::min(end, t * S + lanes); ++j)
+          kernels_.scatter(to, row + t * S, column, from, {j, j + 1}, {j - t * S, lanes});
+      }
+    });
+  }
+  std::uint32_t panel_row(const Supernode& f, Index place) const {
+    const Index row = place < f.columns ? place : place - f.columns + wide(f) * S;
+    return static_cast<std::uint32_t>(static_cast<std::int64_t>(row / S) * S * f.columns + row % S);
+  }
+  std::uint32_t update_row(Index row) const {
+    return static_cast<std::uint32_t>(strips::triangle(row / S, S) + row % S);
+  }
+
+  template <class Use>
+  void share_strips(const Worker& worker, Run strips, bool backwards, const Use& use) const {
+    const Index step = worker.team == nullptr ? kRows / S : kRows / 2 / S;
+    const int count = std::max((strips.end - strips.begin + step - 1) / step, 0);
+    worker.share(count, [&](int i) {
+      const Index begin = strips.begin + (backwards ? count - 1 - i : i) * step;
+      use(Run{begin, std::min(begin + step, strips.end)});
+    });
+  }
+
+  template <class Use>
+  void for_children(Index s, Use use) const {
+    for (Index c = tree().child_start[at(s)]; c < tree().child_start[at(s) + 1]; ++c)
+      use(node(tree().child[at(c)]));
+  }
+
+  T* part(Index s) const { return vector_.get() + start_[at(s)]; }
+
+  void forward(Index s, const double* rhs, double scale) {
+    const Supernode& f = node(s);
+    T* const x = part(s);
+    T* const below = x + wide(f) * S;
+    std::fill(x, below + tall(f) * S, T(0));
+    for (Index j = 0; j < f.columns; ++j)
+      x[j] = static_cast<T>(rhs[tree().order[at(f.first + j)]] * scale);
+    for (Index c = tree().child_start[at(s)]; c < tree().child_start[at(s) + 1]; ++c) {
+      const Index child = tree().child[at(c)];
+      const Index* const place = places(node(child));
+      const T* const from = part(child) + wide(node(child)) * S;
+      for (Index i = 0; i < node(child).below; ++i)
+        (place[i] < f.columns ? x : below - f.columns)[place[i]] += from[i];
+    }
+    kernels_.forward(panel(f), f.columns, tall(f), x, below);
+  }
+
+  void backward(Index s, double* result, double scale) {
+    const Supernode& f = node(s);
+    T* const x = part(s);
+    T* const below = x + wide(f) * S;
+    if (f.parent >= 0) {
+      const Supernode& parent = node(f.parent);
+      const T* const from = part(f.parent);
+      const Index shift = wide(parent) * S - parent.columns;
+      const Index* const place = places(f);
+      for (Index i = 0; i < f.below; ++i)
+        below[i] = from[place[i] < parent.columns ? place[i] : place[i] + shift];
+    }
+    kernels_.backward(panel(f), f.columns, tall(f), x, below, work_[0].get());
+    for (Index j = 0; j < f.columns; ++j)
+      result[tree().order[at(f.first + j)]] = static_cast<double>(x[j]) * scale;
+  }
+
+  const strips::Kernels<T>& kernels_ = strips::kernels<T>();
+  const Index S = kernels_.lanes;
+  const CscPattern* pattern_ = nullptr;
+  const double* values_ = nullptr;
+  double scale_ = 1.0; // of the matrix
+  std::shared_ptr<const TreeReport> analysis_;
+  ArrayOf<T> factor_, updates_, vector_;
+  std::vector<std::int64_t> start_;                // of each supernode in vector_
+  Index tallest_ = 0, widest_ = 0;                 // rows below, and columns, in whole strips
+  std::vector<ArrayOf<T>> work_;                   // of each thread
+  std::vector<std::vector<std::uint32_t>> offset_; // of each thread
+  Team team_;
+  std::atomic<Index> failed_{0}; // the first column without a positive pivot
+};
+
+} // namespace
+
+std::unique_ptr<Backend> make_cholesky(Precision precision) {
+  if (precision == Precision::Single) return std::make_unique<Cholesky<float>>();
+  return std::make_unique<Cholesky<double>>();
+}
+
+} // namespace supple

@@ -1,0 +1,305 @@
+/// The kernels of strips.hpp for one width of vectors. Included once by each instruction set's unit
+/// in an unnamed namespace, and includes nothing: a function shared between units would be the one
+/// of whichever instruction set the linker takes.
+
+template <class T, int Bytes, int Columns>
+struct Strips {
+  static constexpr int S = Bytes / static_cast<int>(sizeof(T)); ///< lanes
+  static constexpr int N = Columns;                             ///< columns of a tile, N divides S
+  typedef T V __attribute__((vector_size(Bytes), may_alias));
+
+  static V load(const T* at) { return *reinterpret_cast<const V*>(at); }
+  static void store(T* at, V value) { *reinterpret_cast<V*>(at) = value; }
+  static Index least(Index a, Index b) { return a < b ? a : b; }
+  static T* strip(T* panel, Index k, Index s) {
+    return panel + static_cast<std::int64_t>(s) * S * k;
+  }
+  static const T* strip(const T* panel, Index k, Index s) {
+    return panel + static_cast<std::int64_t>(s) * S * k;
+  }
+
+  /// sum[r][j] = Σ_p a[r](p) b(p, j): the loop where nearly all of the work is done.
+  template <int R, int W>
+  static inline __attribute__((always_inline)) void product(V (&sum)[R][W], const T* const (&a)[R],
+                                                            const T* b, Index depth) {
+#pragma GCC unroll 4
+    for (int r = 0; r < R; ++r)
+#pragma GCC unroll 8
+      for (int j = 0; j < W; ++j)
+        sum[r][j] = V{};
+    for (Index p = 0; p < depth; ++p) {
+      V row[R];
+#pragma GCC unroll 4
+      for (int r = 0; r < R; ++r)
+        row[r] = load(a[r] + p * S);
+#pragma GCC unroll 8
+      for (int j = 0; j < W; ++j) {
+        const T factor = b[p * S + j];
+#pragma GCC unroll 4
+        for (int r = 0; r < R; ++r)
+          sum[r][j] += row[r] * factor;
+      }
+    }
+  }
+
+  /// C −= A Bᵀ, or C = −A Bᵀ, of which the first `width` columns count.
+  template <int R, bool Fresh>
+  static void tile(T* const (&c)[R], const T* const (&a)[R], const T* b, Index depth, Index width) {
+    V sum[R][N];
+    product<R, N>(sum, a, b, depth);
+#pragma GCC unroll 8
+    for (int j = 0; j < N; ++j) {
+      if (j >= width) break;
+#pragma GCC unroll 4
+      for (int r = 0; r < R; ++r)
+        store(c[r] + j * S, Fresh ? -sum[r][j] : load(c[r] + j * S) - sum[r][j]);
+    }
+  }
+
+  /// The same for the `count` ≤ 3 strips that begin at `s`.
+  template <bool Fresh, class Target>
+  static void tiles(const Target& target, const T* a, Index k, Index s, Index count, const T* b,
+                    Index depth, Index width) {
+    const T* const first = strip(a, k, s);
+    const std::int64_t next = static_cast<std::int64_t>(S) * k;
+    if (count == 3)
+      tile<3, Fresh>({target(s), target(s + 1), target(s + 2)},
+                     {first, first + next, first + 2 * next}, b, depth, width);
+    else if (count == 2)
+      tile<2, Fresh>({target(s), target(s + 1)}, {first, first + next}, b, depth, width);
+    else
+      tile<1, Fresh>({target(s)}, {first}, b, depth, width);
+  }
+
+  static void update(T* panel, Index k, Run strips, Run columns) {
+    for (Index p = 0; p < columns.begin; p += kDepth) {
+      const Index depth = least(kDepth, columns.begin - p);
+      for (Index j = columns.begin; j < columns.end; j += N) {
+        const T* const b = strip(panel, k, j / S) + p * S + j % S;
+        const auto target = [&](Index s) { return strip(panel, k, s) + j * S; };
+        for (Index s = strips.begin; s < strips.end; s += 3)
+          tiles<false>(target, panel + p * S, k, s, least(3, strips.end - s), b, depth,
+                       least(N, columns.end - j));
+      }
+    }
+  }
+
+  static void outer(T* triangle_, const T* below, Index k, Run strips) {
+    for (Index p = 0; p < k; p += kDepth) {
+      const Index depth = least(kDepth, k - p);
+      for (Index j = 0; j < strips.end * S; j += N) {
+        const Index first = j / S; // the strip in which these columns have their diagonal
+        const T* const b = strip(below, k, first) + p * S + j % S;
+        const auto target = [&](Index s) { return triangle_ + triangle(s, S) + j * S; };
+        for (Index s = first > strips.begin ? first : strips.begin; s < strips.end; s += 3) {
+          const Index count = least(3, strips.end - s);
+          if (p == 0)
+            tiles<true>(target, below + p * S, k, s, count, b, depth, N);
+          else
+            tiles<false>(target, below + p * S, k, s, count, b, depth, N);
+        }
+      }
+    }
+  }
+
+  /// Columns [j, j + width) of R strips: what the block's columns before them leave, divided.
+  template <int R>
+  static void divide_tile(T* const (&c)[R], const T* diagonal, Index begin, Index j, Index width) {
+    V x[R][N];
+    const T* a[R];
+#pragma GCC unroll 4
+    for (int r = 0; r < R; ++r)
+      a[r] = c[r] + begin * S;
+    product<R, N>(x, a, diagonal + begin * S + j % S, j - begin);
+#pragma GCC unroll 8
+    for (int i = 0; i < N; ++i)
+#pragma GCC unroll 4
+      for (int r = 0; r < R; ++r)
+        x[r][i] = load(c[r] + (j + i) * S) - x[r][i];
+    const T* const l = diagonal + j * S + j % S;
+#pragma GCC unroll 8
+    for (int i = 0; i < N; ++i) {
+      if (i >= width) break;
+#pragma GCC unroll 4
+      for (int r = 0; r < R; ++r) {
+        x[r][i] *= l[i * S + i];
+        store(c[r] + (j + i) * S, x[r][i]);
+      }
+#pragma GCC unroll 8
+      for (int n = i + 1; n < N; ++n)
+#pragma GCC unroll 4
+        for (int r = 0; r < R; ++r)
+          x[r][n] -= x[r][i] * l[i * S + n];
+    }
+  }
+
+  static void divide_strips(T* panel, Index k, Index s, Index count, Index begin, Index j,
+                            Index width) {
+    const T* const diagonal = strip(panel, k, j / S);
+    T* const first = strip(panel, k, s);
+    const std::int64_t next = static_cast<std::int64_t>(S) * k;
+    if (count == 3)
+      divide_tile<3>({first, first + next, first + 2 * next}, diagonal, begin, j, width);
+    else if (count == 2)
+      divide_tile<2>({first, first + next}, diagonal, begin, j, width);
+    else
+      divide_tile<1>({first}, diagonal, begin, j, width);
+  }
+
+  static void divide(T* panel, Index k, Run strips, Run columns) {
+    for (Index s = strips.begin; s < strips.end; s += 3)
+      for (Index j = columns.begin; j < columns.end; j += N)
+        divide_strips(panel, k, s, least(3, strips.end - s), columns.begin, j,
+                      least(N, columns.end - j));
+  }
+
+  /// The strip that holds the diagonal of columns [j, j + width).
+  static Index factor_tile(T* own, Index begin, Index j, Index width) {
+    V x[1][N];
+    product<1, N>(x, {own + begin * S}, own + begin * S + j % S, j - begin);
+    for (int i = 0; i < N; ++i)
+      x[0][i] = load(own + (j + i) * S) - x[0][i];
+    const int shift = static_cast<int>(j % S);
+    for (int i = 0; i < width; ++i) {
+      V& column = x[0][i];
+      const T pivot = column[shift + i];
+      if (!(pivot > 0)) return j + i;
+      const T reciprocal = 1 / root(pivot);
+      column *= reciprocal;
+      for (int r = 0; r < shift + i; ++r)
+        column[r] = 0;
+      for (int n = i + 1; n < width; ++n)
+        x[0][n] -= column * column[shift + n];
+      column[shift + i] = reciprocal;
+      store(own + (j + i) * S, column);
+    }
+    return -1;
+  }
+  static float root(float x) { return __builtin_sqrtf(x); }
+  static double root(double x) { return __builtin_sqrt(x); }
+
+  static Index factor(T* panel, Index k, Run columns) {
+    const Index end = (columns.end + S - 1) / S;
+    for (Index j = columns.begin; j < columns.end; j += N) {
+      const Index width = least(N, columns.end - j), own = j / S;
+      const Index failed = factor_tile(strip(panel, k, own), columns.begin, j, width);
+      if (failed >= 0) return failed;
+      for (Index s = own + 1; s < end; s += 3)
+        divide_strips(panel, k, s, least(3, end - s), columns.begin, j, width);
+    }
+    return -1;
+  }
+
+  static void scatter(T* to, const std::uint32_t* row, const std::uint32_t* column, const T* from,
+                      Run columns, Run rows) {
+    if (rows.begin == 0 && rows.end == S) {
+      for (Index j = columns.begin; j < columns.end; ++j)
+#pragma GCC unroll 16
+        for (int lane = 0; lane < S; ++lane)
+          to[row[lane] + column[j]] += from[j * S + lane];
+      return;
+    }
+    for (Index j = columns.begin; j < columns.end; ++j)
+      for (Index lane = rows.begin; lane < rows.end; ++lane)
+        to[row[lane] + column[j]] += from[j * S + lane];
+  }
+
+  /// Σ_j strip(:, j) x_j of R strips, R·4 sums at once.
+  template <int R>
+  static void apply(V (&sum)[R], const T* first, std::int64_t next, const T* x, Index k) {
+    V part[R][4] = {};
+    Index j = 0;
+    for (; j + 4 <= k; j += 4)
+#pragma GCC unroll 4
+      for (int i = 0; i < 4; ++i)
+#pragma GCC unroll 4
+        for (int r = 0; r < R; ++r)
+          part[r][i] += load(first + r * next + (j + i) * S) * x[j + i];
+    for (; j < k; ++j)
+#pragma GCC unroll 4
+      for (int r = 0; r < R; ++r)
+        part[r][0] += load(first + r * next + j * S) * x[j];
+    for (int r = 0; r < R; ++r)
+      sum[r] = (part[r][0] + part[r][1]) + (part[r][2] + part[r][3]);
+  }
+
+  static void forward(const T* panel, Index k, Index strips, T* x, T* below) {
+    const Index diagonal = (k + S - 1) / S;
+    const std::int64_t next = static_cast<std::int64_t>(S) * k;
+    for (Index s = 0; s < diagonal; ++s) {
+      const T* const own = strip(panel, k, s);
+      V sum[1];
+      apply<1>(sum, own, next, x, s * S);
+      V values = load(x + s * S) - sum[0];
+      const Index width = least(S, k - s * S);
+      for (Index i = 0; i < width; ++i) {
+        const V column = load(own + (s * S + i) * S);
+        const T solved = values[i] * column[i];
+        values -= column * solved;
+        values[i] = solved;
+      }
+      store(x + s * S, values);
+    }
+    Index s = 0;
+    for (; s + 2 <= strips; s += 2) {
+      V sum[2];
+      apply<2>(sum, strip(panel, k, diagonal + s), next, x, k);
+      store(below + s * S, load(below + s * S) - sum[0]);
+      store(below + (s + 1) * S, load(below + (s + 1) * S) - sum[1]);
+    }
+    if (s < strips) {
+      V sum[1];
+      apply<1>(sum, strip(panel, k, diagonal + s), next, x, k);
+      store(below + s * S, load(below + s * S) - sum[0]);
+    }
+  }
+
+  /// work[j] += Σ_r strip_r(:, j) y_r, lane by lane.
+  template <int R>
+  static void gather(T* work, const T* first, std::int64_t next, const T* y, Index k) {
+    V value[R];
+#pragma GCC unroll 4
+    for (int r = 0; r < R; ++r)
+      value[r] = load(y + r * S);
+    for (Index j = 0; j < k; ++j) {
+      V sum = load(work + j * S);
+#pragma GCC unroll 4
+      for (int r = 0; r < R; ++r)
+        sum += load(first + r * next + j * S) * value[r];
+      store(work + j * S, sum);
+    }
+  }
+
+  static T total(V v) {
+    T sum = 0;
+#pragma GCC unroll 16
+    for (int i = 0; i < S; ++i)
+      sum += v[i];
+    return sum;
+  }
+
+  static void backward(const T* panel, Index k, Index strips, T* x, const T* below, T* work) {
+    const Index diagonal = (k + S - 1) / S;
+    const std::int64_t next = static_cast<std::int64_t>(S) * k;
+    for (Index j = 0; j < k; ++j)
+      store(work + j * S, V{});
+    Index s = 0;
+    for (; s + 4 <= strips; s += 4)
+      gather<4>(work, strip(panel, k, diagonal + s), next, below + s * S, k);
+    for (; s < strips; ++s)
+      gather<1>(work, strip(panel, k, diagonal + s), next, below + s * S, k);
+    for (Index t = diagonal - 1; t >= 0; --t) {
+      const T* const own = strip(panel, k, t);
+      V values{};
+      for (Index i = least(S, k - t * S) - 1; i >= 0; --i) {
+        const V column = load(own + (t * S + i) * S); // values is zero up to lane i
+        const T sum = total(load(work + (t * S + i) * S) + column * values);
+        values[i] = (x[t * S + i] - sum) * column[i];
+      }
+      store(x + t * S, values);
+      gather<1>(work, own, next, x + t * S, t * S);
+    }
+  }
+
+  static constexpr Kernels<T> table{S, update, factor, divide, outer, scatter, forward, backward};
+};
