@@ -21,7 +21,7 @@ WIDTH = """#if defined(__AVX512F__)
 #: What composites read of either path.
 PLAIN = "#define LANES 1\n#define LOWER 0\n#define ALIGNED\n"
 
-_TYPES = """
+TYPES = """
 #define LOWER 1
 #define ALIGNED _Alignas(SUPPLE_ALIGNMENT)
 typedef double vec __attribute__((vector_size(8 * LANES), may_alias));
@@ -38,4 +38,10 @@ IN_LANES supple_all(double a) { return a - (vec){0}; }
 @cache
 def preamble() -> str:
     """LANES, types, selection and vector functions; stands behind the contract."""
-    return WIDTH + _TYPES + (Path(__file__).parent / "math.h").read_text(encoding="utf-8")
+    return WIDTH + TYPES + functions()
+
+
+def functions() -> str:
+    """The vector functions; stands behind LANES and TYPES."""
+    headers = (Path(__file__).parent / name for name in ("math.h", "angles.h"))
+    return "".join(header.read_text(encoding="utf-8") for header in headers)

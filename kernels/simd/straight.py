@@ -17,6 +17,8 @@ from .expressions import Code, Expressions
 
 #: Greatest whole exponent that is written as products.
 _MOST = 8
+#: Greatest power of a cube root that is written as products.
+_THIRDS = 11
 #: Greatest distance of two exponents of which one power is made from the other.
 _APART = 3
 
@@ -133,6 +135,9 @@ class StraightLines:
                     and abs(step - round(step)) < 1e-15 * abs(exponent)):  # fmt: skip
                 whole = self._raised(base, float(abs(round(step))))
                 return f"{text} * {whole if step > 0 else self._inverse(whole)}"
+        thirds = round(3 * exponent)
+        if abs(3 * exponent - thirds) <= 4e-15 * abs(thirds) and abs(thirds) <= _THIRDS:
+            return f"supple_pow_thirds({base}, {thirds})"
         return f"supple_pow({base}, supple_all({exponent!r}))"
 
 
