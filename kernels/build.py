@@ -61,7 +61,11 @@ def library(unit: Unit, ahead: Path, folder: Path | None = None) -> Path:
     """
     law_hash = reader.read(unit.law).source_hash if unit.law else ""
     built = ahead / f"{unit.name}.so"
-    if not unit.plain and built.exists() and fingerprint.mark(law_hash).encode() in built.read_bytes():
+    if (
+        not unit.plain
+        and built.exists()
+        and fingerprint.mark(law_hash).encode() in built.read_bytes()
+    ):
         return built
     contract = (ahead / "kernel.h").read_text(encoding="utf-8")
     cached = _trusted(folder or user_folder()) / f"{unit.name}-{_key(unit, law_hash, contract)}"
