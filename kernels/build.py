@@ -27,7 +27,7 @@ from . import fingerprint, reader
 from .unit import Unit
 
 OPTIMISATION = (
-    "-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=fast",
+    "-O2", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=fast",
 )  # fmt: skip
 #: Kernels are long straight lines: these passes find next to nothing there and take half of GCC's
 #: time. Measured without them: the same speed or up to 8 % more.
@@ -61,7 +61,11 @@ def library(unit: Unit, ahead: Path, folder: Path | None = None) -> Path:
     """
     law_hash = reader.read(unit.law).source_hash if unit.law else ""
     built = ahead / f"{unit.name}.so"
-    if not unit.plain and built.exists() and fingerprint.mark(law_hash).encode() in built.read_bytes():
+    if (
+        not unit.plain
+        and built.exists()
+        and fingerprint.mark(law_hash).encode() in built.read_bytes()
+    ):
         return built
     contract = (ahead / "kernel.h").read_text(encoding="utf-8")
     cached = _trusted(folder or user_folder()) / f"{unit.name}-{_key(unit, law_hash, contract)}"
