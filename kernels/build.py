@@ -27,7 +27,7 @@ from . import fingerprint, reader, targets
 from .unit import Unit
 
 OPTIMISATION = (
-    "-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=fast",
+    "-O2", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=fast",
 )  # fmt: skip
 #: Kernels are long straight lines: these passes find next to nothing there and take half of GCC's
 #: time. Measured without them: the same speed or up to 8 % more.

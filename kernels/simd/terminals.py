@@ -42,7 +42,7 @@ class Terminals:
                 sums[a.lhs.name] += self._written_out(a, loop)
             rest.append((loop, [a for a in adds if a not in known]))
         for name, text in sums.items():
-            lines.append(f"const vec {name} = {text};" if text else f"vec {name} = {{0}};")
+            lines.append(f"const vec {name} = {text};" if text else f"vec {name} = supple_all(0.0);")
         return lines + [line for loop, adds in rest if adds for line in self._loop(loop, adds)]
 
     def _written_out(self, add: Any, loop: Any) -> str:
@@ -54,7 +54,7 @@ class Terminals:
         for i in range(loop.begin.value, loop.end.value):
             access = f"{_ARRAYS.get(entry.array.name, entry.array.name)}[{index(entry, str(i))}]"
             terms += term(float(values[i]), access)
-        return terms or "(vec){0}"
+        return terms or "supple_all(0.0)"
 
     def _loop(self, loop: Any, adds: list[Any]) -> list[str]:
         i = loop.index.name
