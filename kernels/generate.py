@@ -9,7 +9,8 @@ own C, one cell a call: the reference that the kernels in lanes are held to.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import ufl
@@ -106,9 +107,11 @@ def source(unit: Unit, contract: str) -> str:
     Raises:
         EnergyFileError: the energy file is wrong, or its law cannot take this form.
     """
-    forms, law_hash = _forms(unit)
+    law_hash = reader.read(unit.law).source_hash if unit.law else ""
+    analysed = _analysed(replace(unit, plain=False), law_hash)
+    forms = analysed.forms
     names = list(forms.fields)
-    compiler = _Compiler(forms, unit.plain)
+    compiler = _Compiler(analysed, unit.plain)
     kernels = [compiler.kernel(name, item) for name, item in forms.kernels.items()]
     kernels += compiler.composites()
     sizes = [_size(c) for c in forms.fields.values()]
@@ -141,16 +144,34 @@ def source(unit: Unit, contract: str) -> str:
     return head + "\n".join(k.code for k in kernels) + tail
 
 
+@dataclass(frozen=True)
+class _Analysed:
+    """Forms, and FFCx's representation of each of their kernels and parts, by name."""
+
+    forms: Forms
+    representations: dict[str, Any]
+
+
+@lru_cache(maxsize=1)  # the second path of a unit needs what took the first one longest
+def _analysed(unit: Unit, law_hash: str) -> _Analysed:
+    forms = _forms(unit)
+    representations = {}
+    for name, item in {**forms.kernels, **forms.parts}.items():
+        analysis = analyze_ufl_objects([item], _OPTIONS["scalar_type"])
+        representations[name] = compute_ir(analysis, {}, name, dict(_OPTIONS), False)
+    return _Analysed(forms, representations)
+
+
 def _helpers(code: str) -> str:
     """Definitions of the functions that ``code`` calls and C lacks."""
     return "\n".join(text for name, text in functions.IN_C.items() if f"{name}(" in code)
 
 
-def _forms(unit: Unit) -> tuple[Forms, str]:
+def _forms(unit: Unit) -> Forms:
     form, wanted = unit.form.removesuffix(SENSITIVITY), unit.form.endswith(SENSITIVITY)
     if unit.law is None:
         load = {**loads.LOADS, "mass": mass.mass}[form](unit.element)
-        return (sensitivity.of(load) if wanted else load), ""
+        return sensitivity.of(load) if wanted else load
     law = reader.read(unit.law)
     checks.require_sound(law)
     pinned = elements.MIXED_DEGREE if form.startswith("mixed") else elements.STIFFNESS_DEGREE
@@ -162,7 +183,7 @@ def _forms(unit: Unit) -> tuple[Forms, str]:
         else:
             made = _LAW_FORMS[form](law, unit.element, degree)
             made = sensitivity.of(made) if wanted else made
-    return made, law.source_hash
+    return made
 
 
 def _size(coefficient: Any) -> int:
@@ -192,8 +213,9 @@ def _part(part: _Kernel, forms: Forms) -> str:
 class _Compiler:
     """Makes C functions of a term's forms, by FFCx's graph or by FFCx's own C."""
 
-    def __init__(self, forms: Forms, plain: bool) -> None:
-        self._forms, self._plain = forms, plain
+    def __init__(self, analysed: _Analysed, plain: bool) -> None:
+        self._forms, self._plain = analysed.forms, plain
+        self._representations = analysed.representations
 
     def composites(self) -> list[_Kernel]:
         """The kernels that C of the form's own makes of parts, which come with the first of them."""
@@ -210,8 +232,7 @@ class _Compiler:
 
     def kernel(self, name: str, item: Any) -> _Kernel:
         """Compile one UFL form, or (expression, points), to one C function."""
-        analysis = analyze_ufl_objects([item], _OPTIONS["scalar_type"])
-        ir = compute_ir(analysis, {}, name, dict(_OPTIONS), False)
+        ir = self._representations[name]
         if isinstance(item, tuple):
             original = ufl.algorithms.extract_coefficients(item[0])
             positions = ir.expressions[0].original_coefficient_positions

@@ -20,7 +20,9 @@ LONGEST = 15_000
 #: Most definitions of a part.
 PART = 3000
 
-_DEFINITION = re.compile(r"^\s*(?:static const |const )?(double|bool|int|vec|mask) (\w+) = ([^{}]*);$")
+_DEFINITION = re.compile(
+    r"^\s*(?:static const |const )?(double|bool|int|vec|mask) (\w+) = ([^{}]*);$"
+)
 _OTHER_ARRAY = re.compile(r"\b(?!w\[)\w+\[")
 _VARIABLE = re.compile(r"\b[A-Za-z_]\w*\b(?!\s*[\[(])")
 

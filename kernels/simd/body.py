@@ -1,6 +1,6 @@
 """FFCx's intermediate representation of a form or of point values → a function body in lanes.
 
-    uniform numbers → what is the same at all points → at each point: terminals, graph, sums into A
+uniform numbers → what is the same at all points → at each point: terminals, graph, sums into A
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def of_points(ir: Any, options: dict[str, Any]) -> str:
     return body.write([value for value, _ in entries], sums)
 
 
-def _weighted(blocks: list[tuple[Any, str]], tables: Tables) -> tuple[list[str], list[tuple[Any, str]]]:
+def _weighted(
+    blocks: list[tuple[Any, str]], tables: Tables
+) -> tuple[list[str], list[tuple[Any, str]]]:
     """Factors times the weight of the one point, once each; the point's weight is 1 from then on."""
     names = {factor: f"f_{k}" for k, factor in enumerate(dict.fromkeys(f for _, f in blocks))}
     weight = number(tables.weights[0])
@@ -78,7 +80,9 @@ class _Graph:
         self.piecewise = self._generator.generate_piecewise_partition(self._rule, self._domain)
         self.varying = self._generator.generate_varying_partition(self._rule, self._domain)
         values = ir.expression.unique_tables[self._domain]
-        weights = np.ones(len(self._rule.points)) if isinstance(ir, ExpressionIR) else self._rule.weights
+        weights = (
+            np.ones(len(self._rule.points)) if isinstance(ir, ExpressionIR) else self._rule.weights
+        )
         self.tables = Tables(weights, {name: np.asarray(v[0, 0]) for name, v in values.items()})
 
     def value(self, factor: int) -> Any:

@@ -37,12 +37,16 @@ class Terminals:
         rest = []
         for loop in loops:
             adds = [s.expr for s in _statements(loop.body) if s.expr.lhs.name in sums]
-            known = [a for a in adds if self._tables.constant(_factors(a)[1].array.name) is not None]
+            known = [
+                a for a in adds if self._tables.constant(_factors(a)[1].array.name) is not None
+            ]
             for a in known:
                 sums[a.lhs.name] += self._written_out(a, loop)
             rest.append((loop, [a for a in adds if a not in known]))
         for name, text in sums.items():
-            lines.append(f"const vec {name} = {text};" if text else f"vec {name} = supple_all(0.0);")
+            lines.append(
+                f"const vec {name} = {text};" if text else f"vec {name} = supple_all(0.0);"
+            )
         return lines + [line for loop, adds in rest if adds for line in self._loop(loop, adds)]
 
     def _written_out(self, add: Any, loop: Any) -> str:
@@ -74,7 +78,7 @@ _ARRAYS = {"coordinate_dofs": "x"}
 
 
 def term(factor: float, value: str) -> str:
-    """" + factor * value", shorter where the factor is 0, 1 or -1."""
+    """ " + factor * value", shorter where the factor is 0, 1 or -1."""
     if factor == 0.0:
         return ""
     sign = " - " if factor < 0 else " + "

@@ -23,7 +23,7 @@ def tabulate(name, folder, plain):
     contract = (_ahead() / "kernel.h").read_text(encoding="utf-8")
     chosen = replace(unit.parse(name, material("neo_hookean").path.parent), plain=plain)
     text = generate.source(chosen, contract)
-    forms, _ = generate._forms(chosen)
+    forms = generate._forms(chosen)
     folder.mkdir()
     exported = text.replace("static void tangent(", "void tangent(")
     (folder / "k.c").write_text(f"{exported}\nconst int lanes = LANES;\n")
