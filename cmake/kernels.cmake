@@ -1,6 +1,7 @@
-# Kernels ahead of time: one C file and one shared object for each unit (kernels/unit.py), in parallel
-# and incrementally: a law's units depend on its energy file and on the generator, a load's on the
-# latter. Which units, flags and files these are says kernels/ahead.py; nothing is listed here.
+# Kernels ahead of time: one C file for each unit (kernels/unit.py) and one shared object for each of
+# SUPPLE_KERNEL_TARGETS in a folder of the target's name, in parallel and incrementally: a law's units
+# depend on its energy file and on the generator, a load's on the latter. Which units, flags and files
+# these are says kernels/ahead.py; nothing is listed here.
 set(materials ${CMAKE_SOURCE_DIR}/materials)
 set(folder ${CMAKE_BINARY_DIR}/kernels)
 set(contract ${CMAKE_SOURCE_DIR}/cpp/include/supple/kernel.h)
@@ -34,19 +35,22 @@ function(add_units law)
 endfunction()
 
 function(add_unit unit)
-  string(REPLACE "." "_" target kernel_${unit})
-  add_library(${target} MODULE ${folder}/${unit}.c)
-  set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME ${unit} SUFFIX ".so"
-    LIBRARY_OUTPUT_DIRECTORY ${folder} C_VISIBILITY_PRESET hidden C_STANDARD 17)
-  target_compile_options(${target} PRIVATE ${flags} $<$<C_COMPILER_ID:GNU>:${gcc_flags}> -Wall -Werror)
-  if(SUPPLE_NATIVE)
-    target_compile_options(${target} PRIVATE -march=native)
-  endif()
-  target_link_libraries(${target} PRIVATE m)
-  install(TARGETS ${target} LIBRARY DESTINATION supple/_kernels)
+  foreach(processor ${SUPPLE_KERNEL_TARGETS})
+    if(NOT processor IN_LIST known_targets)
+      message(FATAL_ERROR "SUPPLE_KERNEL_TARGETS: expected some of ${known_targets}, got ${processor}")
+    endif()
+    string(MAKE_C_IDENTIFIER kernel_${unit}_${processor} target)
+    add_library(${target} MODULE ${folder}/${unit}.c)
+    set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME ${unit} SUFFIX ".so"
+      LIBRARY_OUTPUT_DIRECTORY ${folder}/${processor} C_VISIBILITY_PRESET hidden C_STANDARD 17)
+    target_compile_options(${target} PRIVATE -march=${processor} ${flags}
+      $<$<C_COMPILER_ID:GNU>:${gcc_flags}> -Wall -Werror)
+    target_link_libraries(${target} PRIVATE m)
+    install(TARGETS ${target} LIBRARY DESTINATION supple/_kernels/${processor})
+  endforeach()
 endfunction()
 
 execute_process(COMMAND ${kernels} --list ${SUPPLE_AOT} OUTPUT_VARIABLE list COMMAND_ERROR_IS_FATAL ANY)
-cmake_language(EVAL CODE "${list}") # sets flags, gcc_flags and generator, and calls add_units
+cmake_language(EVAL CODE "${list}") # sets known_targets, flags, gcc_flags, generator; calls add_units
 
 install(FILES ${contract} DESTINATION supple/_kernels)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from . import fingerprint, reader
+from . import fingerprint, reader, targets
 from .build import GCC_ONLY, OPTIMISATION
 from .law import Law
 from .unit import FACETS, FORMULATIONS, OFFERED, SENSITIVITY, Unit, loads
@@ -67,7 +67,7 @@ def of_law(law: Law) -> list[Unit]:
 
 
 def as_cmake(choice: str, materials: Path) -> str:
-    """What cmake/kernels.cmake needs, as CMake code: flags, generator and calls of add_units.
+    """What cmake/kernels.cmake needs, as CMake code: targets, flags, generator, calls of add_units.
 
     The units of one law and form come together, for one process generates them.
 
@@ -78,6 +78,7 @@ def as_cmake(choice: str, materials: Path) -> str:
     for unit in CHOICES[choice](materials):
         batches.setdefault((unit.law.stem if unit.law else "", unit.form), []).append(unit.name)
     lists: dict[str, Iterable[str]] = {
+        "known_targets": targets.KNOWN,
         "flags": OPTIMISATION,
         "gcc_flags": GCC_ONLY,
         "generator": (file.as_posix() for file in fingerprint.sources()),

@@ -1,6 +1,6 @@
 """Where the library of a unit is: compiled ahead by CMake, in the user's cache, or compiled now.
 
-    ahead of time, by this generator?  → its path
+    ahead of time, for this processor (targets.py), by this generator?  → its path
     in the cache?   → hash checked → its path
     else            → generate → compile aside → rename into the cache
 
@@ -23,7 +23,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from . import fingerprint, reader
+from . import fingerprint, reader, targets
 from .unit import Unit
 
 OPTIMISATION = (
@@ -52,7 +52,7 @@ def library(unit: Unit, ahead: Path, folder: Path | None = None) -> Path:
 
     Args:
         unit: what is wanted.
-        ahead: folder of the libraries and of kernel.h that CMake installed.
+        ahead: folder of kernel.h and of a folder of libraries a target that CMake installed.
         folder: the cache; None for the user's own.
 
     Raises:
@@ -60,18 +60,23 @@ def library(unit: Unit, ahead: Path, folder: Path | None = None) -> Path:
         BuildError: no compiler, a failed compilation, or a cache that others can write to.
     """
     law_hash = reader.read(unit.law).source_hash if unit.law else ""
-    built = ahead / f"{unit.name}.so"
-    if (
-        not unit.plain
-        and built.exists()
-        and fingerprint.mark(law_hash).encode() in built.read_bytes()
-    ):
+    built = None if unit.plain else _ahead(unit, ahead, law_hash)
+    if built:
         return built
     contract = (ahead / "kernel.h").read_text(encoding="utf-8")
     cached = _trusted(folder or user_folder()) / f"{unit.name}-{_key(unit, law_hash, contract)}"
     if not _is_whole(cached):
         _compile(unit, contract, cached)
     return cached / "kernels.so"
+
+
+def _ahead(unit: Unit, ahead: Path, law_hash: str) -> Path | None:
+    """The library compiled ahead for the best target of this processor, by this generator."""
+    target = targets.best(ahead, targets.flags())
+    built = target / f"{unit.name}.so" if target else None
+    if built and built.exists() and fingerprint.mark(law_hash).encode() in built.read_bytes():
+        return built
+    return None
 
 
 def user_folder() -> Path:

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 #: Files of this folder that decide what is built or refused, but no line of C.
-WITHOUT_C = ("__main__.py", "ahead.py", "build.py", "checks.py")
+WITHOUT_C = ("__main__.py", "ahead.py", "build.py", "checks.py", "targets.py")
 
 
 def sources() -> list[Path]:

@@ -6,6 +6,7 @@ Ninja decides for real; in the place of the generator stands a script that write
 from __future__ import annotations
 
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -38,7 +39,7 @@ for unit in sys.argv[begin:end]:
 class Tree:
     """A copy of the kernels' part of the project, configured in its folder `build`."""
 
-    def __init__(self, root: Path, folder: Path, laws: list[str], choice: str) -> None:
+    def __init__(self, root: Path, folder: Path, laws: list[str], *settings: str) -> None:
         self.folder, self.build = folder, folder / "build"
         shutil.copytree(root / "cmake", folder / "cmake")
         ignored = shutil.ignore_patterns("__pycache__")
@@ -50,7 +51,8 @@ class Tree:
         python.write_text(INSTEAD, encoding="utf-8")
         python.chmod(0o755)
         (folder / "CMakeLists.txt").write_text(PROJECT.format(python=python), encoding="utf-8")
-        self.run("cmake", "-G", "Ninja", "-S", folder, "-B", self.build, f"-DSUPPLE_AOT={choice}")
+        given = [f"-D{s}" for s in ("SUPPLE_KERNEL_TARGETS=native", *settings)]
+        self.run("cmake", "-G", "Ninja", "-S", folder, "-B", self.build, *given)
 
     def run(self, *command: object) -> str:
         words = [str(word) for word in command]
@@ -60,7 +62,7 @@ class Tree:
 
     def rebuilt(self) -> set[str]:
         """Build; the units that were linked."""
-        return set(re.findall(r"Linking C \S+ module kernels/(\S+)\.so", self.ninja()))
+        return set(re.findall(r"Linking C \S+ module kernels/native/(\S+)\.so", self.ninja()))
 
     def ninja(self, *words: str) -> str:
         return self.run("ninja", "-C", self.build, *words)
@@ -68,7 +70,8 @@ class Tree:
     def units(self) -> set[str]:
         """Those that Ninja knows, once it has looked whether its own file is up to date."""
         self.ninja("build.ninja")
-        return set(re.findall(r"^kernels/(\S+)\.so:", self.ninja("-t", "targets", "all"), re.M))
+        known = self.ninja("-t", "targets", "all")
+        return set(re.findall(r"^kernels/native/(\S+)\.so:", known, re.M))
 
     def edit(self, file: str) -> None:
         path = self.folder / file
@@ -79,7 +82,7 @@ class Tree:
 def tree(root, tmp_path_factory):
     """Built once: the demo's choice of the shipped laws."""
     laws = ["neo_hookean", "corotational_polar", "mooney_rivlin", "yeoh"]
-    made = Tree(root, tmp_path_factory.mktemp("tree"), laws, "demo")
+    made = Tree(root, tmp_path_factory.mktemp("tree"), laws, "SUPPLE_AOT=demo")
     assert made.rebuilt() == made.units()
     return made
 
@@ -101,7 +104,7 @@ def test_touching_one_energy_rebuilds_its_units_alone(tree, law):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", ["build.py", "checks.py", "__main__.py", "ahead.py"])
+@pytest.mark.parametrize("file", ["build.py", "checks.py", "__main__.py", "ahead.py", "targets.py"])
 def test_what_writes_no_c_rebuilds_nothing(tree, file):
     tree.edit(f"kernels/{file}")
     assert tree.rebuilt() == set()
@@ -117,7 +120,7 @@ def test_the_generator_and_the_contract_rebuild_all(tree):
 @pytest.mark.slow
 def test_a_new_energy_needs_no_edit(root, tmp_path):
     """With -DSUPPLE_AOT=all: listed when its file appears, by what its file says at any time."""
-    tree = Tree(root, tmp_path / "tree", ["neo_hookean"], "all")
+    tree = Tree(root, tmp_path / "tree", ["neo_hookean"], "SUPPLE_AOT=all")
     assert "yeoh.P1.direct" not in tree.units()
     shutil.copy(root / "materials/yeoh.py", tree.folder / "materials/yeoh.py")
     assert tree.units() >= {"yeoh.P1.direct", "yeoh.P2.mixed_direct", "yeoh.P1.direct_sensitivity"}
@@ -125,6 +128,31 @@ def test_a_new_energy_needs_no_edit(root, tmp_path):
     (tree.folder / "materials/yeoh.py").write_text(whole, encoding="utf-8")
     assert "yeoh.P1.direct" in tree.units()
     assert "yeoh.P2.mixed_direct" not in tree.units()
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names of x86 processors")
+@pytest.mark.slow
+def test_a_list_of_targets_is_compiled_into_a_folder_each(root, tmp_path):
+    """Every unit for every target, for the processor that its folder is named after."""
+    two = ("x86-64-v2", "x86-64-v3")
+    laws = ["neo_hookean", "corotational_polar", "mooney_rivlin"]
+    settings = ("SUPPLE_AOT=demo", f"SUPPLE_KERNEL_TARGETS={';'.join(two)}")
+    tree = Tree(root, tmp_path / "tree", laws, *settings)
+    tree.ninja()
+    files = {t: {f.name for f in (tree.build / "kernels" / t).glob("*.so")} for t in two}
+    assert files[two[0]] == files[two[1]]
+    assert "neo_hookean.P1.direct.so" in files[two[0]]
+    pattern = r"-march=(\S+) .* -o \S*/kernel_\w+?_(x86_64_v\d)\.dir/"
+    compilations = re.findall(pattern, tree.ninja("-t", "commands"))
+    assert len(compilations) == sum(map(len, files.values()))
+    assert all(march.replace("-", "_") == folder for march, folder in compilations)
+
+
+@pytest.mark.slow
+def test_an_unknown_target_is_refused_with_those_that_there_are(root, tmp_path):
+    settings = ("SUPPLE_AOT=demo", "SUPPLE_KERNEL_TARGETS=x86-64-v9")
+    with pytest.raises(AssertionError, match=r"(?s)expected\s+some\s.*got\s+x86-64-v9"):
+        Tree(root, tmp_path / "tree", ["neo_hookean"], *settings)
 
 
 def test_what_cmake_runs_writes_one_whole_c_file_a_unit(root, tmp_path):
