@@ -11,7 +11,7 @@ import click
 
 from .. import profile
 from ..core import core
-from ..workers import available
+from ..threads import available
 from ._run import Run
 
 if TYPE_CHECKING:
