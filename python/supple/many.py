@@ -127,8 +127,8 @@ class Solver:
 
     def _state(self, body: Body, x: Any) -> State:
         settings = self._asked.settings
-        if not self._asked.warm:
-            return body.solve(**settings)
+        if not self._asked.warm:  # with no factor that another entry has left
+            return body.solve(**({"solver": "direct"} | settings))
         state, start = None, self._solved.start(x)
         if start is not None:
             try:
