@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from . import assembly, terms
+from .alone import alone
 from .errors import ConvergenceError, InputError, SuppleError
 from .nearby import Nearby, numbers
 from .state import State
@@ -76,7 +77,7 @@ def solve(body: Body, asked: Request) -> list[Any]:
         _changed(body, entry, number, asked)
     if not asked.parameters:
         return []
-    assembly.system(body)  # compiles what is not compiled yet, once
+    alone(assembly.system)(body)  # compiles what is not compiled yet, once
     from .workers import Lost  # and multiprocessing: one who solves once does without
 
     found: list[Any] = [None] * len(asked.parameters)

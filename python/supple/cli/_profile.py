@@ -133,8 +133,8 @@ def advice(found: Profile, facts: Facts) -> Iterator[str]:
         )
         if facts.solver.startswith("direct: as asked") and share.get("factor", 0.0) > _LARGE:
             yield (
-                'every tangent was factorised, as solver "direct" asks; "auto" keeps a factor while '
-                "it serves."
+                'every tangent was factorised, as solver "direct" asks; "auto" keeps a factor '
+                "while it serves."
             )
         if facts.gflops < _SLOW_BLAS:
             yield (
