@@ -21,9 +21,8 @@ def alone(work: Work) -> Work:
     def guarded(body: Any, *args: Any, **options: Any) -> Any:
         if not body._busy.acquire(blocking=False):
             raise InputError(
-                f"the body is busy: {work.__name__} was called while the same body is being "
-                "solved, in another thread or by the one that asks for progress; give each thread "
-                "a body of its own, body.on(body.mesh)."
+                "the body is busy: it is being solved, in another thread or by the one that asks "
+                "for progress; give each thread a body of its own, body.on(body.mesh)."
             )
         try:
             return work(body, *args, **options)

@@ -248,7 +248,8 @@ class Body:
                 would take longer than to do the work. Each has one thread and a copy of the body.
                 1 keeps to this process, and so does a call inside of a worker.
             warm: start from what the same process has solved nearby, and from zero where that
-                fails. False is from zero always: repeatable to the last bit.
+                fails. False is from zero always, with ``solver="direct"`` unless another is asked
+                for: the same to the last bit in any order and by any processes.
             reduce: called with each state where it was solved; what it returns is all that comes
                 back, so that large states need not.
             change: what an entry means where a mapping does not say it: ``change(body, entry)``

@@ -13,10 +13,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from . import assembly, terms, workers
+from . import assembly, terms
+from .alone import alone
 from .errors import ConvergenceError, InputError, SuppleError
 from .nearby import Nearby, numbers
 from .state import State
+from .threads import available
 
 if TYPE_CHECKING:
     from .body import Body
@@ -75,10 +77,12 @@ def solve(body: Body, asked: Request) -> list[Any]:
         _changed(body, entry, number, asked)
     if not asked.parameters:
         return []
-    assembly.system(body)  # compiles what is not compiled yet, once
+    alone(assembly.system)(body)  # compiles what is not compiled yet, once
+    from .workers import Lost  # and multiprocessing: one who solves once does without
+
     found: list[Any] = [None] * len(asked.parameters)
     for done, (number, answer) in enumerate(_answers(body, asked), 1):
-        if isinstance(answer, workers.Lost):
+        if isinstance(answer, Lost):
             answer = SuppleError(f"parameters[{number}]: {answer}")
         found[number] = _with_body(answer, body, asked, number)
         if asked.progress:
@@ -88,8 +92,10 @@ def solve(body: Body, asked: Request) -> list[Any]:
 
 def _answers(body: Body, asked: Request) -> Iterator[tuple[int, Any]]:
     """(number, answer) of every entry, as they come in."""
+    from .workers import Workers
+
     entries, done = list(asked.parameters), 0
-    count = min(asked.processes or workers.available(), len(entries))
+    count = min(asked.processes or available(), len(entries))
     parts = (body, replace(asked, parameters=(), progress=None))
     if asked.processes is None and count > 1:
         here, begin = Solver(*parts), time.monotonic()
@@ -99,7 +105,7 @@ def _answers(body: Body, asked: Request) -> Iterator[tuple[int, Any]]:
             if (time.monotonic() - begin) / done * (len(entries) - done) > WORTHWHILE:
                 break
     if done < len(entries):
-        with workers.Workers(min(count, len(entries) - done), Solver, *parts) as pool:
+        with Workers(min(count, len(entries) - done), Solver, *parts) as pool:
             for number, answer in pool.answers(entries[done:], lose=True):
                 yield done + number, answer
 
@@ -122,8 +128,8 @@ class Solver:
 
     def _state(self, body: Body, x: Any) -> State:
         settings = self._asked.settings
-        if not self._asked.warm:
-            return body.solve(**settings)
+        if not self._asked.warm:  # with no factor that another entry has left
+            return body.solve(**({"solver": "direct"} | settings))
         state, start = None, self._solved.start(x)
         if start is not None:
             try:

@@ -53,15 +53,22 @@ def require_held(mesh: Mesh, fixed: npt.NDArray[np.bool_], normals: dict[int, Fl
 
 
 def pieces(mesh: Mesh) -> list[Ints]:
-    """Node ids of each connected piece of the mesh."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """Node ids of each connected piece of the mesh.
 
-    first = np.repeat(mesh.cells[:, 0], mesh.cells.shape[1])
-    n = len(mesh.points)
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, mesh.cells.ravel())), (n, n))
-    count, label = connected_components(graph, directed=False)
-    return [np.flatnonzero(label == k) for k in range(count)]
+    Every node points at a lower one of its piece or at itself, its root; in each round the roots of
+    a cell's nodes are hooked to the lowest of them (Shiloach, Vishkin 1982, J. Algorithms 3).
+    """
+    root = np.arange(len(mesh.points))
+    while True:
+        roots = root[mesh.cells]
+        lowest = np.broadcast_to(roots.min(axis=1, keepdims=True), roots.shape)
+        if (roots == lowest).all():
+            break
+        np.minimum.at(root, roots.ravel(), lowest.ravel())
+        while (root[root] != root).any():
+            root = root[root]
+    order = np.argsort(root, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(root[order])) + 1)
 
 
 def node_shares(mesh: Mesh, nodes: Ints) -> Floats:

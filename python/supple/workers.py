@@ -34,11 +34,6 @@ class Lost(SuppleError):
     """The process at work on a task was ended from outside."""
 
 
-def available() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def inside() -> bool:
     """Whether this process is one that another started to share its work."""
     return parent_process() is not None

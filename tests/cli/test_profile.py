@@ -111,6 +111,7 @@ def test_kernels_are_compiled_or_found(
         ({"factor": 8.0, "assembly": 2.0}, {}, ["linear algebra takes 80 %"]),
         ({"factor": 8.0, "assembly": 2.0}, {"element": "P2"}, ["P1 cells are cheaper than P2"]),
         ({"factor": 8.0, "assembly": 2.0}, {"gflops": 8.0}, ["BLAS makes 8 GFLOP/s"]),
+        ({"factor": 8.0, "assembly": 2.0}, {"solver": "direct: as asked"}, ['"auto" keeps']),
         ({"assembly": 6.0, "residual": 2.0, "factor": 2.0}, {}, ["the cells take 80 %"]),
         ({"factor": 8.0, "reading": 2.0}, {"cores": 4}, ["1 of 4 cores", "OMP_NUM_THREADS=4"]),
         ({"factor": 8.0, "reading": 2.0}, {"steps": 9}, ["9 load steps"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,17 @@ def test_each_name_of_an_entry_is_what_it_says() -> None:
     ]  # fmt: skip
     for state, one in zip(body(True).solve_many(entries), expected, strict=True):
         assert np.allclose(state.u, one.solve().u, rtol=0, atol=1e-8 * one.mesh.size)
+
+
+def test_bodies_states_and_rest_shapes_go_to_other_processes_whole() -> None:
+    """Through pickle, as any pool of processes sends them: laws, skins, supports, loads."""
+    plane = supple.Surface(np.array([[-1.0, -1, 0], [1, -1, 0], [0, 2, 0]]), np.array([[0, 1, 2]]))
+    given = body(skin=True).slide(lambda p: p[:, 2] < 1e-9, plane)
+    state, rest = given.solve(), body().rest_shape()
+    again, state_again, rest_again = pickle.loads(pickle.dumps((given, state, rest)))
+    assert np.array_equal(again.solve().u, state.u)
+    assert np.array_equal(state_again.cauchy(), state.cauchy())
+    assert np.array_equal(rest_again.body().solve().u, rest.body().solve().u)
 
 
 def test_the_body_stays_as_it_is() -> None:

@@ -19,7 +19,8 @@ from supple.breast.model import Materials, build_body, set_materials
 from supple.breast.poses import IMPATIENCE, Poses, solve_poses
 from supple.breast.skin_misfit import SkinMisfit, mean_absolute
 from supple.errors import ConvergenceError, InputError
-from supple.workers import Workers, available
+from supple.threads import available
+from supple.workers import Workers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,7 +11,7 @@ import click
 
 from .. import profile
 from ..core import core
-from ..workers import available
+from ..threads import available
 from ._run import Run
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ class Facts:
     threads: int
     cores: int
     gflops: float
+    solver: str = ""  # what was picked and why
 
 
 def option(work: Work) -> Work:
@@ -67,10 +68,12 @@ def report(run: Run, found: Profile | None, state: Equilibrium) -> None:
         return
     element = state._solved.mesh.element
     steps = len({i["load_factor"] for i in state.history})
-    facts = Facts(element, steps, core().threads(), available(), core().blas_report().gflops)
+    solver = str(state.timings.get("solver", ""))
+    gflops = core().blas_report().gflops
+    facts = Facts(element, steps, core().threads(), available(), gflops, solver)
     described = described_as(found, facts)
-    if "solver" in state.timings:
-        described["solver"] = state.timings["solver"]
+    if solver:
+        described["solver"] = solver
     run.result["profile"] = described
     for line in table(described):
         run.say(line)
@@ -128,6 +131,11 @@ def advice(found: Profile, facts: Facts) -> Iterator[str]:
             f"linear algebra takes {100 * linear:.0f} %: it grows faster than the mesh, half as "
             "many nodes take about a third of it" + _lower_order(facts) + "."
         )
+        if facts.solver.startswith("direct: as asked") and share.get("factor", 0.0) > _LARGE:
+            yield (
+                'every tangent was factorised, as solver "direct" asks; "auto" keeps a factor '
+                "while it serves."
+            )
         if facts.gflops < _SLOW_BLAS:
             yield (
                 f"this machine's BLAS makes {facts.gflops:.0f} GFLOP/s where one that knows the "

@@ -39,7 +39,7 @@ def _samples(run: Run, table: Path, samples: int, seed: int, jobs: int, resume: 
     from ..studies import sagging_block as block
     from ..studies import sagging_block_figure as figure
     from ..studies import sagging_block_samples as many
-    from ..workers import available
+    from ..threads import available
 
     if samples < 1 or jobs < 0 or seed < 0:
         raise InputError(
