@@ -9,7 +9,7 @@ from typing import Any
 #: Colours that stay apart for colour-blind eyes (Okabe, Ito 2008), and which are drawn.
 COLOURS = {
     "mesh": "#999999",
-    "pattern": "#F0E442",
+    "pattern": "#56B4E9",
     "analysis": "#E69F00",
     "assembly": "#009E73",
     "factor": "#0072B2",
@@ -50,7 +50,7 @@ def _times(panel: Any, rows: Sequence[Any]) -> None:
     panel.loglog([first, last], [base * first / last, base], ":", color="#999999", label="∝ dofs")
     panel.set_xlabel("dofs")
     panel.set_ylabel("seconds")
-    panel.legend(fontsize=7)
+    panel.legend(fontsize=7, loc="upper left")
     panel.grid(True, which="major", lw=0.3)
 
 

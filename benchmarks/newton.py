@@ -31,6 +31,8 @@ import supple
 Answer = dict[str, Any]
 #: Worst relative error of a tip; the codes stop at 1e-10 of the load.
 BAR = 1e-6
+#: Letters of a note that stands in the table; longer ones stand below.
+SHORT = 20
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ def table(rows: list[Row], machine: str, left_out: list[str]) -> str:
             "second solve, ms", "first / second", "residual", "tip error")  # fmt: skip
     lines = ["# Newton on the benchmark cantilever", "", machine, "", *output.markdown(head, (
         (
-            f"{r.element} {r.law}", r.code + (f" ({r.note})" if r.note else ""), r.dofs,
+            f"{r.element} {r.law}", named(r), r.dofs,
             r.iterations, f"**{r.total_ms:.0f}**", number(r.over_best),
             f"{r.iteration_ms:.1f} [{r.assembly_ms:.1f} / {r.linear_ms:.1f}]",
             number(r.assembly_over), output.digits(r.second_ms), number(r.second_over),
@@ -203,8 +205,15 @@ def table(rows: list[Row], machine: str, left_out: list[str]) -> str:
         )
         for r in rows
     ))]  # fmt: skip
+    said = [f"{r.code}, {r.element} {r.law}: {r.note}" for r in rows if len(r.note) > SHORT]
+    lines += [f"\n{sentence}" for sentence in said]
     lines += [f"\nNot measured: {reason}" for reason in left_out]
     return "\n".join(lines) + "\n"
+
+
+def named(row: Row) -> str:
+    """The code, with its note where that is a word and no sentence."""
+    return f"{row.code} ({row.note})" if 0 < len(row.note) <= SHORT else row.code
 
 
 def number(value: float | None) -> str | None:

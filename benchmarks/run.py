@@ -42,6 +42,8 @@ def run(part: str, given: argparse.Namespace) -> Done:
         value = getattr(given, name)
         if value is not None:
             command += [f"--{name.replace('_', '-')}", str(value)]
+    if part == "rest_shape" and not given.large:
+        command.append("--skip-large")
     if given.repeats:
         command += ["--repeats", str(given.repeats)]
     begin = time.perf_counter()
@@ -76,6 +78,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
     parser.add_argument("--largest", type=int, help="dofs of the growth with multigrid")
     parser.add_argument("--largest-direct", type=int, help="dofs of the growth with factors")
+    parser.add_argument("--large", action="store_true", help="rest shapes of 100,000 dofs too")
     parser.add_argument("--results", type=Path, default=HERE, help="folder of the page")
     given = parser.parse_args()
     parts = [run(part, given) for part in PARTS if part in given.only]

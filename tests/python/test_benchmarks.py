@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,22 @@ import numpy as np
 import pytest
 
 import supple
+from supple import laws
+
+#: A kernel library of one loop.
+COUNTED = """
+#include "kernel.h"
+static void residual(double* A, const double* w, const double* x) {
+  for (int i = 0; i < 10; ++i) A[0] += w[i] * x[0];
+}
+static const int numbers[] = {0};
+static const supple_field fields[] = {{"u", 10}};
+static const supple_kernel kernels[] = {{.name = "residual", .rows = 1, .cols = 1,
+  .field_count = 1, .fields = numbers, .call = residual}};
+static const supple_library table = {.nodes = 1, .lanes = 1, .field_count = 1, .fields = fields,
+  .kernel_count = 1, .kernels = kernels};
+const supple_library* supple_kernels(void) { return &table; }
+"""
 
 
 @pytest.fixture
@@ -133,11 +150,30 @@ def test_operations_of_an_instruction(load: Any, mnemonic: str, operands: str, c
     assert load("flops").operations(mnemonic, operands) == count
 
 
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="single steps are x86's")
+def test_operations_of_a_call_are_those_of_its_source(load: Any, tmp_path: Path) -> None:
+    """Ten products and ten sums, as the loop says; its instructions are stepped through."""
+    source, library = tmp_path / "k.c", tmp_path / "k.so"
+    source.write_text(COUNTED, encoding="ascii")
+    native = load("native")
+    command = ["cc", "-O0", "-ffp-contract=off", "-fPIC", "-shared", f"-I{laws._ahead()}"]
+    subprocess.run([*command, str(source), "-o", str(library)], check=True)
+    c = native.load()
+    table = c.open_library(str(library).encode())
+    kernel, w, x = c.find(table, b"residual"), np.ones(10), np.ones(3)
+    steps = np.zeros(2000, dtype=np.uint64)
+    count = c.trace(table, kernel, w.ctypes.data, x.ctypes.data, steps.ctypes.data, len(steps))
+    assert 20 < count < len(steps)
+    assert load("flops").count(steps[:count]) == 20
+    assert c.trace(table, kernel, w.ctypes.data, x.ctypes.data, steps.ctypes.data, 5) == 6
+    assert c.time_calls(table, kernel, w.ctypes.data, x.ctypes.data, 1, 100) > 0
+
+
 def test_exponents_of_growth_are_those_of_the_rows(load: Any) -> None:
     """Times 2 dofs^1.5, memory 5 dofs^0.9, whatever small sizes do."""
     growth = load("growth")
     rows = [
-        growth.Row("direct", n, *[1.0 if n < 10_000 else 2 * n**1.5] * 7, 5 * n**0.9, 5, 0, 5)
+        growth.Row("direct", n, *[1.0 if n < 10_000 else 2 * n**1.5] * 8, 5 * n**0.9, 5, 0, 5)
         for n in (1000, 20_000, 50_000, 300_000)
     ]
     found = growth.exponents(rows)
@@ -167,10 +203,10 @@ def test_the_smallest_block_grows_and_is_drawn(
     load: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     growth = load("growth")
-    monkeypatch.setattr(growth, "EDGES", (2, 3))
+    monkeypatch.setattr(growth, "EDGES", (3,))
     rows, left_out = growth.measure({"direct": 1000, "multigrid": 0}, 60.0)
-    assert [r.dofs for r in rows] == [81, 192]
-    assert left_out == ["multigrid from 81 dofs on: --largest"]
+    assert [r.dofs for r in rows] == [192]
+    assert left_out == ["multigrid from 192 dofs on: --largest"]
     assert all(r.megabytes > 10 and r.total >= r.assembly > 0 for r in rows)
     load("growth_figure").draw(rows, tmp_path)
     assert (tmp_path / "growth.svg").stat().st_size > 1000
