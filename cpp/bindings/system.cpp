@@ -40,7 +40,8 @@ supple::NewtonResult solve(supple::System& system, const Vector& start, const Ve
 }
 
 py::tuple tangent(supple::System& system, const Vector& u) {
-  const Vector values = system.assemble_tangent(u, 1.0);
+  system.assemble_tangent(u, 1.0);
+  const Vector& values = system.full_tangent();
   const supple::BlockPattern& pattern = system.pattern();
   return py::make_tuple(values, py::array(py::cast(pattern.column)),
                         py::array(py::cast(pattern.row_start)));
@@ -73,9 +74,8 @@ void bind_terms(py::module_& module) {
                                                         system.points(), connectivity(cells),
                                                         system.scalars());
           }))
-      .def_property_readonly(
-          "cells",
-          [](const supple::KernelTerm& term) { return supple::Connectivity(term.cells()); })
+      .def_property_readonly("cells",
+                             [](const supple::KernelTerm& term) { return term.given_cells(); })
       .def_property_readonly(
           "nodes", [](const supple::KernelTerm& term) { return term.library().table().nodes; })
       .def("set_scalar_unit", &supple::KernelTerm::set_scalar_unit)

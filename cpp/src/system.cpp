@@ -17,6 +17,7 @@ double factor_of(const Term& term, double load_factor) {
 
 void System::add(std::shared_ptr<Term> term) {
   terms_.push_back(std::move(term));
+  graph_.reset();
   pattern_.reset();
   reduction_.reset();
   forget_factors();
@@ -95,37 +96,77 @@ VolumeRatio System::volume_ratio(const ConstVector& u) const {
   return smallest;
 }
 
-const BlockPattern& System::pattern() {
-  if (!pattern_) {
-    std::vector<Connectivity> cells;
-    cells.reserve(terms_.size());
-    for (const auto& term : terms_)
-      cells.push_back(term->cells());
-    pattern_ = std::make_unique<BlockPattern>(
-        block_pattern(static_cast<Index>(points_->size() / 3), cells, home_));
+std::vector<Connectivity> System::connectivities() const {
+  std::vector<Connectivity> cells;
+  cells.reserve(terms_.size());
+  for (const auto& term : terms_)
+    cells.push_back(term->cells());
+  return cells;
+}
+
+const NodeGraph& System::graph() {
+  if (!graph_) {
+    const auto nodes = static_cast<Index>(points_->size() / 3);
+    graph_ = std::make_unique<NodeGraph>(node_graph(nodes, connectivities(), home_));
   }
+  return *graph_;
+}
+
+const BlockPattern& System::pattern() {
+  if (!pattern_)
+    pattern_ = std::make_unique<BlockPattern>(block_pattern(graph(), connectivities()));
   return *pattern_;
 }
 
-const Vector& System::assemble_tangent(const ConstVector& u, double load_factor) {
-  const BlockPattern& p = pattern();
-  const Stopwatch watch(timings.assembly);
+const Reduction& System::reduction() {
+  if (reduction_) return *reduction_;
+  if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
+  if (kind() == Kind::Unsymmetric) {
+    const Storage part = iterates() ? Storage::Lower : Storage::Full;
+    reduction_ = std::make_unique<Reduction>(reduce(pattern(), free_, part));
+  } else {
+    reduction_ = std::make_unique<Reduction>(reduce_lower(graph(), free_));
+    lower_ = lower_scatter(graph(), *reduction_, connectivities());
+  }
+  return *reduction_;
+}
+
+void System::assemble_tangent(const ConstVector& u, double load_factor) {
+  const Reduction& r = reduction();
   at_ = u;
-  values_.setZero(p.nonzeros());
+  load_factor_ = load_factor;
+  full_is_made_ = false;
+  if (kind() == Kind::Unsymmetric) return assemble_full();
+  const Stopwatch watch(timings.assembly);
+  lower_values_.setZero(r.pattern.nonzeros());
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const double scale = factor_of(*terms_[t], load_factor);
-    if (scale != 0.0) terms_[t]->tangent(u, scale, p.scatter[t], values_);
+    if (scale != 0.0) terms_[t]->tangent(u, scale, lower_[t], lower_values_);
   }
+}
+
+void System::assemble_full() {
+  const BlockPattern& p = pattern();
+  const Stopwatch watch(timings.assembly);
+  values_.setZero(p.nonzeros());
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    const double scale = factor_of(*terms_[t], load_factor_);
+    if (scale != 0.0) terms_[t]->tangent(at_, scale, p.scatter[t], values_);
+  }
+  full_is_made_ = true;
+}
+
+const Vector& System::full_tangent() {
+  if (!full_is_made_) assemble_full();
   return values_;
 }
 
-const Reduction& System::reduction() {
-  if (!reduction_) {
-    if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
-    const Storage part = iterates() ? Storage::Lower : storage(kind());
-    reduction_ = std::make_unique<Reduction>(reduce(pattern(), free_, part));
-  }
-  return *reduction_;
+const Vector& System::reduced_tangent() {
+  if (kind() != Kind::Unsymmetric) return lower_values_;
+  const Stopwatch watch(timings.assembly);
+  reduced_.resize(reduction().pattern.nonzeros());
+  reduction().gather(values_, reduced_);
+  return reduced_;
 }
 
 FactorStatus System::factorise(double shift) {
@@ -136,9 +177,10 @@ FactorStatus System::factorise(double shift) {
     factor_ = std::make_unique<Factor>(kind());
     factor_->analyse(r.pattern);
   }
-  reduced_.resize(r.pattern.nonzeros());
-  r.gather(values_, reduced_);
+  const Vector* values = &reduced_tangent();
   if (shift > 0.0) {
+    reduced_ = *values;
+    values = &reduced_;
     // The lower triangle's columns begin with their diagonal entry.
     double mean = 0.0;
     for (std::int64_t j = 0; j < r.pattern.size; ++j) {
@@ -151,7 +193,7 @@ FactorStatus System::factorise(double shift) {
   }
   current_ = factor_.get();
   ++timings.factorisations;
-  return factor_->factorise(reduced_);
+  return factor_->factorise(*values);
 }
 
 FactorStatus System::prepare_inverse() {
@@ -177,11 +219,9 @@ FactorStatus System::factorise_indefinite() {
     indefinite_ = std::make_unique<Factor>(Kind::QuasiDefinite);
     indefinite_->analyse(r.pattern);
   }
-  reduced_.resize(r.pattern.nonzeros());
-  r.gather(values_, reduced_);
   current_ = indefinite_.get();
   ++timings.factorisations;
-  return indefinite_->factorise(reduced_);
+  return indefinite_->factorise(reduced_tangent());
 }
 
 Vector System::solve(const ConstVector& rhs, double tolerance) {
@@ -204,7 +244,7 @@ Vector System::solve(const ConstVector& rhs, double tolerance) {
 
 Vector System::apply(const ConstVector& x) {
   Vector y = Vector::Zero(dofs());
-  multiply(pattern(), values_, x, y);
+  multiply(pattern(), full_tangent(), x, y);
   return y;
 }
 
