@@ -27,7 +27,7 @@ from . import fingerprint, reader
 from .unit import Unit
 
 OPTIMISATION = (
-    "-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=fast",
+    "-O2", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffp-contract=fast",
 )  # fmt: skip
 #: Kernels are long straight lines: these passes find next to nothing there and take half of GCC's
 #: time. Measured without them: the same speed or up to 8 % more.
@@ -61,7 +61,7 @@ def library(unit: Unit, ahead: Path, folder: Path | None = None) -> Path:
     """
     law_hash = reader.read(unit.law).source_hash if unit.law else ""
     built = ahead / f"{unit.name}.so"
-    if built.exists() and fingerprint.mark(law_hash).encode() in built.read_bytes():
+    if not unit.plain and built.exists() and fingerprint.mark(law_hash).encode() in built.read_bytes():
         return built
     contract = (ahead / "kernel.h").read_text(encoding="utf-8")
     cached = _trusted(folder or user_folder()) / f"{unit.name}-{_key(unit, law_hash, contract)}"
@@ -77,7 +77,8 @@ def user_folder() -> Path:
 
 
 def _key(unit: Unit, law_hash: str, contract: str) -> str:
-    parts = [unit.name, law_hash, contract, _generator(), _processor(), _compiler_state(), *FLAGS]
+    parts = [unit.name, "plain" if unit.plain else "lanes", law_hash, contract]
+    parts += [_generator(), _processor(), _compiler_state(), *FLAGS]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
@@ -85,7 +86,7 @@ def _key(unit: Unit, law_hash: str, contract: str) -> str:
 def _generator() -> str:
     """The generator's own sources and the versions of what it stands on."""
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.rglob("*.py")):
+    for file in sorted([*Path(__file__).parent.rglob("*.py"), *fingerprint.headers()]):
         digest.update(file.read_bytes())
     versions = [version(f"fenics-{name}") for name in ("ffcx", "ufl", "basix")]
     return digest.hexdigest() + " ".join(versions)

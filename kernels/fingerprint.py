@@ -14,7 +14,12 @@ def sources() -> list[Path]:
     """The files that generated C depends on."""
     folder = Path(__file__).parent
     without = {folder / name for name in WITHOUT_C}
-    return [file for file in sorted(folder.rglob("*.py")) if file not in without]
+    return [file for file in sorted(folder.rglob("*.py")) if file not in without] + headers()
+
+
+def headers() -> list[Path]:
+    """C that is copied into the kernels."""
+    return sorted(Path(__file__).parent.rglob("*.h"))
 
 
 def mark(law_hash: str) -> str:

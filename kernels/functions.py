@@ -39,6 +39,11 @@ IN_C = {
     }
     return sum;
 }""",
+    "supple_exponential_integral": """
+IN_LANES supple_exponential_integral(vec x) {
+    for (int l = 0; l < LANES; ++l) x[l] = exponential_integral(x[l]);
+    return x;
+}""",
 }
 
 

@@ -20,17 +20,23 @@ LONGEST = 15_000
 #: Most definitions of a part.
 PART = 3000
 
-_DEFINITION = re.compile(r"^\s*(?:static const |const )?(double|bool|int) (\w+) = ([^{}]*);$")
+_DEFINITION = re.compile(r"^\s*(?:static const |const )?(double|bool|int|vec|mask) (\w+) = ([^{}]*);$")
 _OTHER_ARRAY = re.compile(r"\b(?!w\[)\w+\[")
 _VARIABLE = re.compile(r"\b[A-Za-z_]\w*\b(?!\s*[\[(])")
 
 
-def in_parts(name: str, body: str) -> tuple[str, str]:
+#: How a variable is put into an array of doubles or of vectors, and taken out, by its type.
+_PUT = {"double": {}, "vec": {"mask": "(vec){}", "double": "supple_all({})"}}
+_TAKE = {"double": {}, "vec": {"mask": "(mask){}", "double": "{}[0]"}}
+
+
+def in_parts(name: str, body: str, entry: str = "double") -> tuple[str, str]:
     """The functions that a kernel's body is cut into, and the body that calls them.
 
     Args:
         name: of the kernel.
         body: its statements, one a line; of arrays the cut runs read `w` alone.
+        entry: type of the arrays' entries, double or vec.
     """
     known: dict[str, str] = {}  # variable → type, of all lines so far
     functions: list[str] = []
@@ -42,7 +48,7 @@ def in_parts(name: str, body: str) -> tuple[str, str]:
         done += len(run)
         if is_scalar and len(run) > LONGEST:
             used = set(_VARIABLE.findall("\n".join(lines[done:])))
-            parts, run = _cut(f"{name}_{len(functions)}", run, known, used)
+            parts, run = _cut(f"{name}_{len(functions)}", run, known, used, entry)
             functions += parts
         known |= _defined(run)
         result += run
@@ -60,8 +66,8 @@ def _defined(lines: Iterable[str]) -> dict[str, str]:
     return {f[2]: f[1] for f in found if f}
 
 
-def _cut(prefix: str, run: list[str], known: dict[str, str],
-         used: set[str]) -> tuple[list[str], list[str]]:  # fmt: skip
+def _cut(prefix: str, run: list[str], known: dict[str, str], used: set[str],
+         entry: str) -> tuple[list[str], list[str]]:  # fmt: skip
     """Functions, and the lines that call them: of what they define those that are ``used``."""
     step = -(-len(run) // -(-len(run) // PART))
     pieces = [run[start : start + step] for start in range(0, len(run), step)]
@@ -71,14 +77,14 @@ def _cut(prefix: str, run: list[str], known: dict[str, str],
     slots = {n: f"t[{i}]" for i, n in enumerate(dict.fromkeys(chain(*reads, results)))}
     names = [f"{prefix}_{i}" for i in range(len(pieces))]
     functions = [
-        _function(name, piece, read, slots, types)
+        _function(name, piece, read, slots, types, entry)
         for name, piece, read in zip(names, pieces, reads, strict=True)
     ]
     calls = [
-        f"double t[{len(slots)}];",
-        *(f"{slot} = {n};" for n, slot in slots.items() if n in known),
+        f"{entry} t[{len(slots)}];",
+        *(_put(n, slot, types, entry) for n, slot in slots.items() if n in known),
         *(f"{name}(t, w);" for name in names),
-        *(f"const {types[n]} {n} = {slots[n]};" for n in results),
+        *(_take(n, slots[n], types, entry) for n in results),
     ]
     return functions, calls
 
@@ -91,10 +97,19 @@ def _read(piece: list[str], types: dict[str, str]) -> list[str]:
     return [n for n in dict.fromkeys(words) if n in types and n not in own]
 
 
+def _put(name: str, slot: str, types: dict[str, str], entry: str) -> str:
+    return f"{slot} = {_PUT[entry].get(types[name], '{}').format(name)};"
+
+
+def _take(name: str, slot: str, types: dict[str, str], entry: str) -> str:
+    value = _TAKE[entry].get(types[name], "{}").format(slot)
+    return f"const {types[name]} {name} = {value};"
+
+
 def _function(name: str, piece: list[str], read: list[str], slots: dict[str, str],
-              types: dict[str, str]) -> str:  # fmt: skip
-    begin = [f"const {types[n]} {n} = {slots[n]};" for n in read]
-    end = [f"{slots[n]} = {n};" for n in _defined(piece) if n in slots]
+              types: dict[str, str], entry: str) -> str:  # fmt: skip
+    begin = [_take(n, slots[n], types, entry) for n in read]
+    end = [_put(n, slots[n], types, entry) for n in _defined(piece) if n in slots]
     lines = "\n".join([*begin, *piece, *end])
-    arguments = "double* restrict t, const double* restrict w"
+    arguments = f"{entry}* restrict t, const {entry}* restrict w"
     return f"static __attribute__((noinline)) void {name}({arguments})\n{{\n{lines}\n}}\n"

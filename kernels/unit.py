@@ -45,12 +45,14 @@ class Unit:
         element: name of the cell or facet element.
         law: energy file, None for a load.
         degree: of the quadrature, maybe with a scheme (`degree.Degree`); None for the pinned rule.
+        plain: FFCx's own C, one cell a call: the reference of the kernels in lanes.
     """
 
     form: str
     element: str
     law: Path | None = None
     degree: int | None = None
+    plain: bool = False
 
     @property
     def name(self) -> str:

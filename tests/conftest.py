@@ -71,7 +71,7 @@ def quick_compiler(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPat
     from supple.kernels import build
 
     if request.node.get_closest_marker("slow"):
-        flags = tuple("-O0" if flag == "-O3" else flag for flag in build.FLAGS)
+        flags = tuple("-O0" if flag == build.OPTIMISATION[0] else flag for flag in build.FLAGS)
         monkeypatch.setattr(build, "FLAGS", flags)
 
 

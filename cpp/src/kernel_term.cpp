@@ -20,14 +20,14 @@ constexpr Index kSmallestGroup = 64;  // cells that one thread treats in one go,
 constexpr Index kLargestGroup = 2048; // what they read and add to fits the second cache
 constexpr Index kMostGroups = 128;    // unless that asks for more: a colour ends in a barrier
 constexpr Index kWorthThreads = 1000; // fewer cells are done before a second thread is awake
-constexpr std::size_t kAlignment = 64;
+constexpr std::size_t kAlignment = SUPPLE_ALIGNMENT;
 
 Index group_size(Index cells, Index lanes) {
   const Index size = std::clamp(cells / kMostGroups + 1, kSmallestGroup, kLargestGroup);
   return (size + lanes - 1) / lanes * lanes;
 }
 
-/// Numbers at an address that is a multiple of 64.
+/// Numbers at an address that is a multiple of SUPPLE_ALIGNMENT.
 class Aligned {
  public:
   void grow(std::size_t size) {
@@ -49,8 +49,8 @@ class Aligned {
 };
 
 /// The kernel leaves entries with column > row as they were.
-bool lower_only(const supple_kernel&) {
-  return false;
+bool lower_only(const supple_kernel& kernel) {
+  return kernel.lower != 0;
 }
 
 std::size_t entries(const supple_kernel& kernel) {

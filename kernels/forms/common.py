@@ -49,6 +49,10 @@ class Forms:
     parts: dict[str, Any] = field(default_factory=dict)
     composites: dict[str, Composite] = field(default_factory=dict)
 
+    def is_symmetric(self, name: str) -> bool:
+        """Whether a kernel or part is a second derivative: the tangent of what has an energy."""
+        return name.endswith("tangent") and "energy" in (*self.kernels, *self.composites)
+
 
 def measure(space: Space, degree: int) -> Any:
     """dx on the term's own mesh with the very points of `at_points`."""

@@ -28,7 +28,8 @@ INNER = ("dilatation", "pressure", "stored")
 
 #: What every composite begins with; law holds U, U', U'' at θ.
 DILATE = """
-    double inner[3 * LANES] = {0}, rest[LANES] = {0}, now[LANES] = {0}, law[3 * LANES] = {0};
+    ALIGNED double inner[3 * LANES] = {0}, law[3 * LANES] = {0};
+    ALIGNED double rest[LANES] = {0}, now[LANES] = {0};
     call_rest_volume(rest, w, inner, x);
     call_volume(now, w, inner, x);
     for (int l = 0; l < LANES; ++l) inner[l] = now[l] / rest[l];
@@ -44,11 +45,11 @@ _ENERGY = """
 """
 #: A += push ⊗ slope: what a pressure pushes with, times the pressure's own derivative.
 _OUTER = """
-    double push[{rows} * LANES] = {{0}}, slope[{cols} * LANES] = {{0}};
+    ALIGNED double push[{rows} * LANES] = {{0}}, slope[{cols} * LANES] = {{0}};
     call_push(push, w, inner, x);
 {slope}
     for (int i = 0; i < {rows}; ++i)
-        for (int j = 0; j < {cols}; ++j)
+        for (int j = 0; j < {end}; ++j)
             for (int l = 0; l < LANES; ++l)
                 A[(i * {cols} + j) * LANES + l] += push[i * LANES + l] * slope[j * LANES + l];
 """
@@ -139,9 +140,10 @@ def model(law: Law, element: str, degree: int, inverse: bool) -> Model:
     return m
 
 
-def outer(rows: int, cols: int, slope: str) -> str:
+def outer(rows: int, cols: int, slope: str, symmetric: bool = False) -> str:
     """Statements that add push ⊗ slope to A; ``slope`` are those that fill slope."""
-    return _OUTER.format(rows=rows, cols=cols, slope=slope)
+    end = f"(LOWER ? i + 1 : {cols})" if symmetric else str(cols)
+    return _OUTER.format(rows=rows, cols=cols, slope=slope, end=end)
 
 
 def weighted(part: str, cols: int, weight: str) -> str:
@@ -156,7 +158,7 @@ def call(part: str) -> str:
 
 def _solver_kernels(m: Model, slope: str) -> dict[str, Composite]:
     m.parts["isochoric_tangent"] = ufl.derivative(m.residual, m.space.displacement, m.space.trial)
-    volumetric = outer(m.dofs, m.dofs, slope)
+    volumetric = outer(m.dofs, m.dofs, slope, symmetric=not m.inverse)
     expression, places = m.parts["isochoric_points"]
     rows = len(places) * int(expression.ufl_shape[0])
     return {

@@ -15,7 +15,7 @@ import ufl
 from .common import Composite, Forms
 from .mean_dilatation import DILATE, Model, call, model, outer, weighted
 
-_BY_POINTS = """    double of_rest[{cols} * LANES] = {{0}};
+_BY_POINTS = """    ALIGNED double of_rest[{cols} * LANES] = {{0}};
     call_volume_by_points(slope, w, inner, x);
     call_rest_volume_by_points(of_rest, w, inner, x);
     for (int j = 0; j < {cols}; ++j)

@@ -42,7 +42,7 @@ def test_the_table_names_unit_law_and_fields(contract):
     text = source("mooney_rivlin.Q1.direct", contract)
     law = reader.read(material("mooney_rivlin").path)
     mark = fingerprint.mark(law.source_hash)
-    assert f'"mooney_rivlin.Q1.direct", "{mark}", "Q1", 8, 0, 1' in text
+    assert f'"mooney_rivlin.Q1.direct", "{mark}", "Q1", 8, 0, LANES' in text
     fields = re.search(r"fields\[\] = \{(.*)\};", text)[1]
     assert fields == '{"u", 24}, {"c1", 1}, {"c2", 1}, {"bulk", 1}'
     for kernel in ("energy", "residual", "tangent", "volume_ratio", "points"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,15 +18,16 @@ from supple.laws import _ahead
 UNITS = ("neo_hookean.P1.direct", "neo_hookean.T1.skin_direct", "neo_hookean.Q1.inverse")
 
 
-def tabulate(name, folder):
-    """The unit's tangent (rows × cols) at a moved, distorted cell, and its C."""
+def tabulate(name, folder, plain):
+    """The unit's tangent (rows × cols) at a moved, distorted cell, in every lane, and its C."""
     contract = (_ahead() / "kernel.h").read_text(encoding="utf-8")
-    materials = material("neo_hookean").path.parent
-    text = generate.source(unit.parse(name, materials), contract)
-    forms, _ = generate._forms(unit.parse(name, materials))
+    chosen = replace(unit.parse(name, material("neo_hookean").path.parent), plain=plain)
+    text = generate.source(chosen, contract)
+    forms, _ = generate._forms(chosen)
     folder.mkdir()
-    (folder / "k.c").write_text(text.replace("static void tangent(", "void tangent("))
-    flags = ["-O1" if f == "-O3" else f for f in build.FLAGS if f != "-fvisibility=hidden"]
+    exported = text.replace("static void tangent(", "void tangent(")
+    (folder / "k.c").write_text(f"{exported}\nconst int lanes = LANES;\n")
+    flags = ["-O1" if f == "-O2" else f for f in build.FLAGS if f != "-fvisibility=hidden"]
     command = [build._compiler(), *flags, "-Wall", "-Werror", "k.c", "-o", "k.so", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     u = forms.fields["u"].ufl_function_space().ufl_element()
@@ -35,20 +37,31 @@ def tabulate(name, folder):
     points += 0.1 * rng.uniform(-1, 1, points.shape)
     sizes = [generate._size(field) for field in forms.fields.values()]
     w = np.concatenate([0.1 * rng.uniform(-1, 1, sizes[0]), np.linspace(0.2, 0.3, sum(sizes[1:]))])
-    A = np.zeros((u.dim, u.dim))
-    pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (A, w, points)]
-    ctypes.CDLL(str(folder / "k.so")).tangent(*pointers)
-    return A, text
+    library = ctypes.CDLL(str(folder / "k.so"))
+    lanes = ctypes.c_int.in_dll(library, "lanes").value
+    arrays = [aligned(a, lanes) for a in (np.zeros(u.dim**2), w, points.ravel())]
+    library.tangent(*(a.ctypes.data_as(ctypes.c_void_p) for a in arrays))
+    return arrays[0].reshape(-1, lanes), text
 
 
+def aligned(values, lanes):
+    """[entry][lane], the same in every lane, at a multiple of 64 bytes."""
+    store = np.empty(values.size * lanes + 8)
+    start = -store.ctypes.data % 64 // 8
+    array = store[start : start + values.size * lanes]
+    array[:] = np.repeat(values, lanes)
+    return array
+
+
+@pytest.mark.parametrize("plain", [False, True])
 @pytest.mark.parametrize("name", UNITS)
-def test_a_kernel_in_parts_gives_the_same_values(name, tmp_path, monkeypatch):
+def test_a_kernel_in_parts_gives_the_same_values(name, plain, tmp_path, monkeypatch):
     """Cut at 200 definitions, into parts of at most 150: as the uncut one, to rounding."""
-    whole, text = tabulate(name, tmp_path / "whole")
+    whole, text = tabulate(name, tmp_path / "whole", plain)
     assert "noinline" not in text
     monkeypatch.setattr(parts, "LONGEST", 200)
     monkeypatch.setattr(parts, "PART", 150)
-    cut, text = tabulate(name, tmp_path / "cut")
+    cut, text = tabulate(name, tmp_path / "cut", plain)
     functions = re.findall(r"noinline\)\) void (\w+)\(.*?\n}\n", text, re.DOTALL)
     assert len(functions) >= 5
     assert np.abs(whole).max() > 0
