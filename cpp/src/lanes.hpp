@@ -50,68 +50,36 @@ void scatter_nodes(const LaneCells& cells, const double* from, double scale, dou
   }
 }
 
-/// Where entry (i, j) of a block goes from its first: i[i] + j[j].
-struct BlockStrides {
-  Index i1, i2, j1, j2;
-
-  /// In columns `step` apart; in rows if the local block is the transposed one.
-  static BlockStrides of(Index step, bool transposed) {
-    const Index near = 1, far = 2, second = step, third = 2 * step - 1;
-    return {transposed ? second : near, transposed ? third : far, transposed ? near : second,
-            transposed ? far : third};
+/// Columns of a block, `step` entries apart in the values, get theirs from `a`: entry (p, q) from
+/// a[p·down + q·right]. With `rows` = 3 there are three columns of three rows, of which the
+/// `diagonal` block has one less in each; a scalar's block has one row, or one entry.
+template <int rows, int columns, bool diagonal>
+inline void add_block(const double* __restrict a, std::ptrdiff_t down, std::ptrdiff_t right,
+                      std::ptrdiff_t step, double* to) {
+  for (int q = 0; q < columns; ++q) {
+    double* target = to + q * step - (q == 2 ? 1 : 0);
+    for (int p = diagonal ? q : 0; p < rows; ++p)
+      target[p] += a[p * down + q * right];
   }
-};
-
-/// The 3 × 3 block `a`, whose rows are `row` apart; only its lower triangle if it is `diagonal`.
-template <int L, bool diagonal>
-inline void add_block(const double* a, std::ptrdiff_t row, const BlockStrides& s, double* to) {
-  const double *b = a + row, *c = b + row;
-  double *second = to + s.i1, *third = to + s.i2;
-  to[0] += a[0];
-  if (!diagonal) to[s.j1] += a[L];
-  if (!diagonal) to[s.j2] += a[2 * L];
-  second[0] += b[0];
-  second[s.j1] += b[L];
-  if (!diagonal) second[s.j2] += b[2 * L];
-  third[0] += c[0];
-  third[s.j1] += c[L];
-  third[s.j2] += c[2 * L];
 }
 
-/// The entries of a block of which a part is free.
-template <int L>
-void add_part(const double* a, std::ptrdiff_t row, Index rows, Index columns, const Index* entry,
-              double* values) {
-  for (Index i = 0; i < rows; ++i)
-    for (Index j = 0; j < columns; ++j, ++entry)
-      if (*entry >= 0) values[*entry] += a[i * row + j * L];
-}
-
-/// The block (a, b) of all lanes.
-template <int L>
+/// The block of local nodes a and b of all lanes.
+template <int L, int rows, int columns, bool diagonal>
 void add_blocks(const LaneCells& cells, const LowerScatter& map, Index a, Index b,
                 const Index* position, const double* block, double* values) {
-  const std::ptrdiff_t blocks = map.blocks();
+  const std::ptrdiff_t blocks = map.blocks(), width = cells.width();
   const std::ptrdiff_t row = std::ptrdiff_t{3 * cells.m + cells.s} * L;
-  const Index rows = a < cells.m ? 3 : 1, columns = b < cells.m ? 3 : 1;
-  const Index* step = map.step->data();
-  for (Index lane = 0; lane < cells.count; ++lane, ++block, position += blocks) {
-    if (*position == -1) continue;
-    if (*position < -1) {
-      add_part<L>(block, row, rows, columns, map.entry.data() - 2 - *position, values);
-      continue;
-    }
-    const Index* node = cells.row(lane);
-    double* to = values + *position;
-    const Index column = std::min(node[a], node[b]);
-    const BlockStrides s = BlockStrides::of(step[column], node[a] < node[b]);
-    if (rows == 3) {
-      a == b ? add_block<L, true>(block, row, s, to) : add_block<L, false>(block, row, s, to);
-    } else {
-      to[0] += block[0];
-      if (columns == 1) continue;
-      to[s.j1] += block[L];
-      to[s.j2] += block[2 * L];
+  const Index *step = map.step->data(), *node = cells.node;
+  for (Index lane = 0; lane < cells.count; ++lane, ++block, position += blocks, node += width) {
+    if (*position >= 0) {
+      const bool transposed = !diagonal && node[a] < node[b];
+      add_block<rows, columns, diagonal>(block, transposed ? L : row, transposed ? row : L,
+                                         step[std::min(node[a], node[b])], values + *position);
+    } else if (*position < -1) { // free in part
+      const Index* entry = map.entry.data() - 2 - *position;
+      for (Index i = 0; i < rows; ++i)
+        for (Index j = 0; j < columns; ++j, ++entry)
+          if (*entry >= 0) values[*entry] += block[i * row + j * L];
     }
   }
 }
@@ -126,7 +94,15 @@ void add_lower(const LaneCells& cells, const LowerScatter& map, Index first, con
     const std::ptrdiff_t row = a < cells.m ? 3 * a : a + 2 * cells.m;
     for (Index b = 0; b <= a; ++b, ++position) {
       const std::ptrdiff_t column = b < cells.m ? 3 * b : b + 2 * cells.m;
-      add_blocks<L>(cells, map, a, b, position, A + (row * d + column) * L, values);
+      const double* block = A + (row * d + column) * L;
+      if (a >= cells.m && b >= cells.m)
+        add_blocks<L, 1, 1, false>(cells, map, a, b, position, block, values);
+      else if (a >= cells.m)
+        add_blocks<L, 1, 3, false>(cells, map, a, b, position, block, values);
+      else if (a == b)
+        add_blocks<L, 3, 3, true>(cells, map, a, b, position, block, values);
+      else
+        add_blocks<L, 3, 3, false>(cells, map, a, b, position, block, values);
     }
   }
 }
