@@ -48,7 +48,8 @@ py::array_t<Number> array(const std::vector<Number>& values) {
 py::tuple tangent(supple::System& system, const Vector& u) {
   const auto assembled = [&]() -> const Vector& {
     const py::gil_scoped_release release;
-    return system.assemble_tangent(u, 1.0);
+    system.assemble_tangent(u, 1.0);
+    return system.full_tangent();
   };
   const Vector& values = assembled();
   const supple::BlockPattern& pattern = system.pattern();
@@ -84,9 +85,8 @@ void bind_terms(py::module_& module) {
                                                         system.points(), connectivity(cells),
                                                         system.scalars());
           }))
-      .def_property_readonly(
-          "cells",
-          [](const supple::KernelTerm& term) { return supple::Connectivity(term.cells()); })
+      .def_property_readonly("cells",
+                             [](const supple::KernelTerm& term) { return term.given_cells(); })
       .def_property_readonly(
           "nodes", [](const supple::KernelTerm& term) { return term.library().table().nodes; })
       .def("set_scalar_unit", &supple::KernelTerm::set_scalar_unit)

@@ -5,7 +5,6 @@
 #include "supple/error.hpp"
 
 namespace supple {
-namespace {
 
 void check_nodes(const Connectivity& cells, Index nodes) {
   if (cells.size() == 0) return;
@@ -16,8 +15,6 @@ void check_nodes(const Connectivity& cells, Index nodes) {
                    std::to_string(low < 0 ? low : high) +
                    "; give the number of nodes that the points have, or renumber the cells");
 }
-
-} // namespace
 
 NodeCells node_cells(Index nodes, const std::vector<Connectivity>& connectivities) {
   for (const Connectivity& cells : connectivities)
@@ -37,6 +34,16 @@ NodeCells node_cells(Index nodes, const std::vector<Connectivity>& connectivitie
       for (Eigen::Index a = 0; a < cells.cols(); ++a)
         map.cell[static_cast<std::size_t>(next[static_cast<std::size_t>(cells(c, a))]++)] = number;
   return map;
+}
+
+Index scalars_of(const Connectivity& cells, Index nodes) {
+  if (cells.rows() == 0) return 0;
+  const auto count = static_cast<Index>((cells.row(0).array() >= nodes).count());
+  const Eigen::Index m = cells.cols() - count;
+  if ((cells.leftCols(m).array() >= nodes).any() || (cells.rightCols(count).array() < nodes).any())
+    throw ShapeError("cells must name their nodes first and their scalars last, got a row that "
+                     "mixes them; number the scalars from the number of nodes on");
+  return count;
 }
 
 } // namespace supple

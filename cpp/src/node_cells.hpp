@@ -14,6 +14,13 @@ struct NodeCells {
 };
 
 /// @throws ShapeError if a cell names a node outside [0, nodes).
+void check_nodes(const Connectivity& cells, Index nodes);
+
+/// @throws ShapeError if a cell names a node outside [0, nodes).
 NodeCells node_cells(Index nodes, const std::vector<Connectivity>& connectivities);
+
+/// How many columns at the end are scalars, numbered from `nodes` on, in every row alike.
+/// @throws ShapeError if a row mixes them.
+Index scalars_of(const Connectivity& cells, Index nodes);
 
 } // namespace supple

@@ -27,10 +27,10 @@ Eigen::Matrix3d polar(Eigen::Matrix3d m) {
 
 } // namespace
 
-NodeRotations::NodeRotations(const BlockPattern& pattern, const Reduction& reduction,
+NodeRotations::NodeRotations(const NodeGraph& graph, const Reduction& reduction,
                              const Vector& points)
-    : pattern_(&pattern), points_(&points) {
-  for (Index a = 0; a < pattern.nodes; ++a) {
+    : graph_(&graph), points_(&points) {
+  for (Index a = 0; a < graph.nodes; ++a) {
     const auto dof = static_cast<std::size_t>(3 * a);
     const Index first = reduction.unknown[dof];
     if (first >= 0 && reduction.unknown[dof + 1] >= 0 && reduction.unknown[dof + 2] >= 0)
@@ -45,9 +45,9 @@ NodeRotations::Moments NodeRotations::moments(Index node, PlaceA place_a, PlaceB
   const Eigen::Vector3d a0 = place_a(node), b0 = place_b(node);
   Eigen::Vector3d sum_a = Eigen::Vector3d::Zero(), sum_b = sum_a;
   Index count = 0;
-  for (Index k = pattern_->node_start[first]; k < pattern_->node_start[first + 1]; ++k) {
-    const Index other = pattern_->neighbour[static_cast<std::size_t>(k)];
-    if (other >= pattern_->nodes) break; // scalars come last
+  for (Index k = graph_->node_start[first]; k < graph_->node_start[first + 1]; ++k) {
+    const Index other = graph_->neighbour[static_cast<std::size_t>(k)];
+    if (other >= graph_->nodes) break; // scalars come last
     const Eigen::Vector3d a = place_a(other) - a0, b = place_b(other) - b0;
     sum.mixed += b * a.transpose();
     sum.own += a * a.transpose();

@@ -15,8 +15,8 @@ class NodeRotations {
  public:
   using Rotations = std::vector<Eigen::Matrix3d>; ///< one a node that is free in all directions
 
-  /// @param points (3n) at rest, m; kept by reference, as `pattern` is.
-  NodeRotations(const BlockPattern& pattern, const Reduction& reduction, const Vector& points);
+  /// @param points (3n) at rest, m; kept by reference, as `graph` is.
+  NodeRotations(const NodeGraph& graph, const Reduction& reduction, const Vector& points);
 
   /// Rotations from rest to `u` (dofs).
   Rotations at(const ConstVector& u) const;
@@ -39,7 +39,7 @@ class NodeRotations {
   template <class PlaceA, class PlaceB>
   Moments moments(Index node, PlaceA a, PlaceB b) const;
 
-  const BlockPattern* pattern_;
+  const NodeGraph* graph_;
   const Vector* points_;
   std::vector<Node> nodes_;
 };

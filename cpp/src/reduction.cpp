@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <numeric>
+
 #include "supple/error.hpp"
 #include "supple/sparse.hpp"
 
@@ -55,22 +58,77 @@ void fill_full(const BlockPattern& pattern, Reduction& reduction) {
   });
 }
 
+/// Everything but which entries there are.
+Reduction number(const NodeGraph& graph, const Mask& free) {
+  require_size("free", free.size(), graph.dofs(), "give one entry for each dof");
+  Reduction reduction;
+  reduction.unknown = number_free(free, reduction.dof);
+  CscPattern& csc = reduction.pattern;
+  csc.size = reduction.free();
+  csc.start.assign(static_cast<std::size_t>(csc.size) + 1, 0);
+  csc.group.reserve(reduction.dof.size());
+  for (Index dof : reduction.dof) { // a scalar is eliminated together with its home
+    const Index scalar = dof - 3 * graph.nodes;
+    csc.group.push_back(scalar < 0 ? dof / 3 : graph.home[static_cast<std::size_t>(scalar)]);
+  }
+  return reduction;
+}
+
+/// The free dofs of a node and of its neighbours.
+class FreeBlocks {
+ public:
+  FreeBlocks(const NodeGraph& graph, const Mask& free) : graph_(graph), free_(free) {}
+
+  /// Call use(dof) for the rows ≥ `dof` of its column; how many they are.
+  template <class Use>
+  std::int64_t column(Index dof, Use use) const {
+    const Index node = dof < 3 * graph_.nodes ? dof / 3 : dof - 2 * graph_.nodes;
+    const Index last = graph_.node_start[static_cast<std::size_t>(node) + 1];
+    std::int64_t count = 0;
+    for (Index k = graph_.find(node, node); k < last; ++k) {
+      const Index other = graph_.neighbour[static_cast<std::size_t>(k)];
+      const Index begin = graph_.first_dof(other), end = begin + graph_.width(other);
+      for (Index row = std::max(begin, dof); row < end; ++row) {
+        if (!free_[row]) continue;
+        use(row);
+        ++count;
+      }
+    }
+    return count;
+  }
+
+ private:
+  const NodeGraph& graph_;
+  const Mask& free_;
+};
+
 } // namespace
 
 Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage) {
-  require_size("free", free.size(), pattern.dofs(), "give one entry for each dof");
-  Reduction reduction;
-  reduction.unknown = number_free(free, reduction.dof);
+  Reduction reduction = number(pattern, free);
   reduction.full_nonzeros = pattern.nonzeros();
+  reduction.pattern.lower = storage == Storage::Lower;
+  reduction.pattern.lower ? fill_lower(pattern, reduction) : fill_full(pattern, reduction);
+  return reduction;
+}
+
+Reduction reduce_lower(const NodeGraph& graph, const Mask& free) {
+  Reduction reduction = number(graph, free);
   CscPattern& csc = reduction.pattern;
-  csc.size = reduction.free();
-  csc.lower = storage == Storage::Lower;
-  csc.start.assign(static_cast<std::size_t>(csc.size) + 1, 0);
-  for (Index dof : reduction.dof) { // a scalar is eliminated together with its home
-    const Index scalar = dof - 3 * pattern.nodes;
-    csc.group.push_back(scalar < 0 ? dof / 3 : pattern.home[static_cast<std::size_t>(scalar)]);
+  csc.lower = true;
+  const FreeBlocks blocks(graph, free);
+#pragma omp parallel for schedule(static)
+  for (Index c = 0; c < reduction.free(); ++c)
+    csc.start[static_cast<std::size_t>(c) + 1] =
+        blocks.column(reduction.dof[static_cast<std::size_t>(c)], [](Index) {});
+  std::partial_sum(csc.start.begin(), csc.start.end(), csc.start.begin());
+  csc.row.resize(static_cast<std::size_t>(csc.start.back()));
+#pragma omp parallel for schedule(static)
+  for (Index c = 0; c < reduction.free(); ++c) {
+    std::int64_t* row = csc.row.data() + csc.start[static_cast<std::size_t>(c)];
+    blocks.column(reduction.dof[static_cast<std::size_t>(c)],
+                  [&](Index dof) { *row++ = reduction.unknown[static_cast<std::size_t>(dof)]; });
   }
-  csc.lower ? fill_lower(pattern, reduction) : fill_full(pattern, reduction);
   return reduction;
 }
 

@@ -1,5 +1,6 @@
 #include "supple/sliding.hpp"
 
+#include "lanes.hpp"
 #include "supple/error.hpp"
 
 namespace supple {
@@ -66,15 +67,28 @@ Eigen::Matrix3d Sliding::stiffness_block(const Projection& at, Eigen::Index i) c
   return Eigen::Matrix3d::Identity() - edge * edge.transpose() / edge.squaredNorm();
 }
 
-void Sliding::tangent(const ConstVector& u, double scale, const Scatter& map,
-                      MutableVector values) const {
+template <class Use>
+void Sliding::each_block(const ConstVector& u, double scale, Use use) const {
   Points moved;
   const Projection at = land(u, moved);
   for (Eigen::Index i = 0; i < cells_.rows(); ++i) {
     const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> block =
         scale * stiffness_[i] * stiffness_block(at, i);
-    scatter_add(map, static_cast<Index>(i), block.data(), values.data());
+    use(static_cast<Index>(i), block.data());
   }
+}
+
+void Sliding::tangent(const ConstVector& u, double scale, const Scatter& map,
+                      MutableVector values) const {
+  each_block(u, scale,
+             [&](Index i, const double* block) { scatter_add(map, i, block, values.data()); });
+}
+
+void Sliding::tangent(const ConstVector& u, double scale, const LowerScatter& map,
+                      MutableVector values) const {
+  each_block(u, scale, [&](Index i, const double* block) {
+    add_lower<1>({cells_.data() + i, 1, 1, 0}, map, i, block, values.data());
+  });
 }
 
 } // namespace supple

@@ -22,6 +22,7 @@ System::~System() = default;
 
 void System::add(std::shared_ptr<Term> term) {
   terms_.push_back(std::move(term));
+  graph_.reset();
   pattern_.reset();
   reduction_.reset();
   forget_factors();
@@ -116,40 +117,85 @@ VolumeRatio System::volume_ratio(const ConstVector& u) const {
   return smallest;
 }
 
+std::vector<Connectivity> System::connectivities() const {
+  std::vector<Connectivity> cells;
+  cells.reserve(terms_.size());
+  for (const auto& term : terms_)
+    cells.push_back(term->cells());
+  return cells;
+}
+
+const NodeGraph& System::graph() {
+  if (!graph_) {
+    const auto nodes = static_cast<Index>(points_->size() / 3);
+    const Stopwatch watch(timings.analysis);
+    graph_ = std::make_unique<NodeGraph>(node_graph(nodes, connectivities(), home_));
+  }
+  return *graph_;
+}
+
 const BlockPattern& System::pattern() {
   if (!pattern_) {
+    const NodeGraph& nodes = graph();
     const Stopwatch watch(timings.analysis);
-    std::vector<Connectivity> cells;
-    cells.reserve(terms_.size());
-    for (const auto& term : terms_)
-      cells.push_back(term->cells());
-    pattern_ = std::make_unique<BlockPattern>(
-        block_pattern(static_cast<Index>(points_->size() / 3), cells, home_));
+    pattern_ = std::make_unique<BlockPattern>(block_pattern(nodes, connectivities()));
   }
   return *pattern_;
 }
 
-const Vector& System::assemble_tangent(const ConstVector& u, double load_factor) {
-  const BlockPattern& p = pattern();
-  const Stopwatch watch(timings.assembly);
-  at_ = u;
-  values_.setZero(p.nonzeros());
-  for (std::size_t t = 0; t < terms_.size(); ++t) {
-    const double scale = factor_of(*terms_[t], load_factor);
-    if (scale != 0.0) terms_[t]->tangent(u, scale, p.scatter[t], values_);
-  }
-  return values_;
-}
-
 const Reduction& System::reduction() {
-  if (!reduction_) {
-    if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
-    const Storage part = iterates() ? Storage::Lower : storage(kind());
+  if (reduction_) return *reduction_;
+  if (free_.size() == 0) free_ = Mask::Constant(dofs(), true);
+  if (kind() == Kind::Unsymmetric) {
+    const Storage part = iterates() ? Storage::Lower : Storage::Full;
     const BlockPattern& whole = pattern();
     const Stopwatch watch(timings.analysis);
     reduction_ = std::make_unique<Reduction>(reduce(whole, free_, part));
+  } else {
+    const NodeGraph& nodes = graph();
+    const Stopwatch watch(timings.analysis);
+    reduction_ = std::make_unique<Reduction>(reduce_lower(nodes, free_));
+    lower_ = lower_scatter(nodes, *reduction_, connectivities());
   }
   return *reduction_;
+}
+
+void System::assemble_tangent(const ConstVector& u, double load_factor) {
+  const Reduction& r = reduction();
+  at_ = u;
+  load_factor_ = load_factor;
+  full_is_made_ = false;
+  if (kind() == Kind::Unsymmetric) return assemble_full();
+  const Stopwatch watch(timings.assembly);
+  lower_values_.setZero(r.pattern.nonzeros());
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    const double scale = factor_of(*terms_[t], load_factor);
+    if (scale != 0.0) terms_[t]->tangent(u, scale, lower_[t], lower_values_);
+  }
+}
+
+void System::assemble_full() {
+  const BlockPattern& p = pattern();
+  const Stopwatch watch(timings.assembly);
+  values_.setZero(p.nonzeros());
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    const double scale = factor_of(*terms_[t], load_factor_);
+    if (scale != 0.0) terms_[t]->tangent(at_, scale, p.scatter[t], values_);
+  }
+  full_is_made_ = true;
+}
+
+const Vector& System::full_tangent() {
+  if (!full_is_made_) assemble_full();
+  return values_;
+}
+
+const Vector& System::reduced_tangent() {
+  if (kind() != Kind::Unsymmetric) return lower_values_;
+  const Stopwatch watch(timings.assembly);
+  reduced_.resize(reduction().pattern.nonzeros());
+  reduction().gather(values_, reduced_);
+  return reduced_;
 }
 
 FactorStatus System::factorise(double shift) {
@@ -161,8 +207,10 @@ FactorStatus System::factorise(double shift) {
     factor_->analyse(r.pattern);
   }
   const Stopwatch watch(timings.factor);
-  gather();
+  const Vector* values = &reduced_tangent();
   if (shift > 0.0) {
+    reduced_ = *values;
+    values = &reduced_;
     // The lower triangle's columns begin with their diagonal entry.
     double mean = 0.0;
     for (std::int64_t j = 0; j < r.pattern.size; ++j) {
@@ -175,18 +223,11 @@ FactorStatus System::factorise(double shift) {
   }
   current_ = factor_.get();
   ++timings.factorisations;
-  const FactorStatus status = factor_->factorise(reduced_);
+  const FactorStatus status = factor_->factorise(*values);
   definite_ = status.ok() && kind() == Kind::Cholesky && shift == 0.0    ? Definite::Yes
               : status.cause == FactorStatus::Cause::NotPositiveDefinite ? Definite::No
                                                                          : Definite::Unknown;
   return status;
-}
-
-/// The reduced tangent's values from those last assembled.
-void System::gather() {
-  const Reduction& r = reduction();
-  reduced_.resize(r.pattern.nonzeros());
-  r.gather(values_, reduced_);
 }
 
 FactorStatus System::prepare() {
@@ -196,15 +237,14 @@ FactorStatus System::prepare() {
     symmetric_ = std::make_unique<SymmetricSolver>(reduction().pattern, rotations(),
                                                    make_factor_preconditioner);
   }
-  gather();
   current_ = nullptr;
-  const FactorStatus status = symmetric_->prepare(reduced_, at_);
+  const FactorStatus status = symmetric_->prepare(reduced_tangent(), at_);
   count_kept();
   return status;
 }
 
 const NodeRotations& System::rotations() {
-  if (!rotations_) rotations_ = std::make_unique<NodeRotations>(pattern(), reduction(), *points_);
+  if (!rotations_) rotations_ = std::make_unique<NodeRotations>(graph(), reduction(), *points_);
   return *rotations_;
 }
 
@@ -262,10 +302,9 @@ FactorStatus System::factorise_indefinite() {
     indefinite_->analyse(r.pattern);
   }
   const Stopwatch watch(timings.factor);
-  gather();
   current_ = indefinite_.get();
   ++timings.factorisations;
-  return indefinite_->factorise(reduced_);
+  return indefinite_->factorise(reduced_tangent());
 }
 
 Vector System::solve(const ConstVector& rhs, double tolerance, bool probe) {
@@ -290,7 +329,7 @@ Vector System::solve(const ConstVector& rhs, double tolerance, bool probe) {
 
 Vector System::apply(const ConstVector& x) {
   Vector y = Vector::Zero(dofs());
-  multiply(pattern(), values_, x, y);
+  multiply(pattern(), full_tangent(), x, y);
   return y;
 }
 

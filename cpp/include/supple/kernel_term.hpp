@@ -10,6 +10,8 @@
 
 namespace supple {
 
+/// Not to be used by two threads at once: it keeps its working memory, so that nothing is allocated
+/// in a Newton step.
 class KernelTerm final : public Term {
  public:
   /// @param points (3n) coordinates of the mesh that the kernels live on, m, node-major.
@@ -18,26 +20,33 @@ class KernelTerm final : public Term {
   /// @throws ShapeError if the kernels have another number of nodes or scalars, or a number is out
   /// of range.
   KernelTerm(std::shared_ptr<const KernelLibrary> library, std::shared_ptr<const Vector> points,
-             Connectivity cells, Index scalars = 0);
+             const Connectivity& cells, Index scalars = 0);
+  ~KernelTerm() override;
 
   /// The unit of the scalar unknowns, Pa/m: a pressure is this times its unknown, so that unknowns
   /// are metres and residuals newtons throughout.
   void set_scalar_unit(double unit) { scalar_unit_ = unit; }
 
-  /// Values of a per-cell field, (cells · size) cell-major.
+  /// Values of a per-cell field, (cells · size) cell-major, the cells as they were given.
   /// @throws ShapeError for an unknown field or a wrong size.
-  void set_field(const std::string& name, Vector values);
+  void set_field(const std::string& name, const ConstVector& values);
 
-  const Connectivity& cells() const override { return cells_; }
+  /// In the order of the batches, along a curve through the body.
+  const Connectivity& cells() const override { return tangent_ == nullptr ? none_ : cells_; }
+  /// As they were given.
+  Connectivity given_cells() const;
   bool has_energy() const override { return energy_ != nullptr || tangent_ == nullptr; }
   bool symmetric() const override { return has_energy(); }
   double energy(const ConstVector& u) const override;
   void residual(const ConstVector& u, double scale, MutableVector r) const override;
   void tangent(const ConstVector& u, double scale, const Scatter& map,
                MutableVector values) const override;
+  void tangent(const ConstVector& u, double scale, const LowerScatter& map,
+               MutableVector values) const override;
+  /// The cell's number is that of the cells as they were given.
   VolumeRatio volume_ratio(const ConstVector& u) const override;
 
-  /// Output of the kernel `name` for each cell, (cells, rows).
+  /// Output of the kernel `name` for each cell as it was given, (cells, rows · cols).
   /// @throws Error if the library has no such kernel.
   Eigen::MatrixXd tabulate(const std::string& name, const ConstVector& u) const;
 
@@ -45,33 +54,44 @@ class KernelTerm final : public Term {
 
  private:
   struct Buffers;
+  struct Workspace;
+  /// A field's values, [batch][entry][lane], or [entry][lane] alike in all batches.
+  struct Field {
+    Vector values;
+    std::ptrdiff_t stride = 0; // from batch to batch
+  };
+
   void require_fields() const;
-  /// Dof of entry `i` of the kernel's vectors, for the cell whose row of cells_ begins at `node`.
-  Index dof(const Index* node, Index i) const {
-    return i < 3 * nodes_ ? 3 * node[i / 3] + i % 3 : node[i - 2 * nodes_] + scalar_offset_;
-  }
-  double unit(Index i) const { return i < 3 * nodes_ ? 1.0 : scalar_unit_; }
   void add_residual(const ConstVector& u, double scale, MutableVector r) const;
   /// The residual of a load that does not depend on u (3n); computed once for the fields' values.
   const Vector& constant() const;
-  /// Gather w and x of the batch of cells [first, first + lanes) and call the kernel on a zeroed A.
-  void call(const supple_kernel& kernel, Index first, const ConstVector& u, Buffers& b) const;
-  /// For each batch: call the kernel, then consume(first cell, cells in the batch, A, batch
-  /// number).
+  /// The entries of w that are alike in all batches.
+  void fill_constants(const supple_kernel& kernel, Buffers& b) const;
+  /// Gather w and x of the batch of cells [first, first + lanes), zero A and call the kernel.
+  template <int L>
+  void call(const supple_kernel& kernel, Index first, const double* u, Buffers& b) const;
+  /// For each batch: call the kernel, then consume(lanes, first cell, cells in the batch, A, group
+  /// number); lanes is an integral constant.
   template <class Consume>
   void each(const supple_kernel& kernel, const ConstVector& u, Consume consume) const;
+  template <int L, class Consume>
+  void each_of(const supple_kernel& kernel, const double* u, Consume consume) const;
+  /// What the scale and the unit of the scalars make of the tangent's entries.
+  void scale_tangent(double scale, double* A) const;
 
   std::shared_ptr<const KernelLibrary> library_;
   std::shared_ptr<const Vector> points_;
-  Connectivity cells_;
   Index nodes_, scalars_;    // of a cell
   Index scalar_offset_;      // from a scalar's number in cells_ to its dof
+  std::vector<Index> order_; // (cells) given number of each
+  Connectivity cells_, none_;
   double scalar_unit_ = 1.0; // Pa/m
   Index group_ = 1;          // cells of a batch of colouring_
   Colouring colouring_;
-  std::vector<Vector> fields_; // by field number; "u" stays empty
+  std::vector<Field> fields_; // by field number; "u" stays empty
   mutable Vector constant_;
   const supple_kernel *energy_, *tangent_, *volume_ratio_;
+  std::unique_ptr<Workspace> work_;
 };
 
 } // namespace supple

@@ -28,6 +28,8 @@ class Sliding final : public Term {
   void residual(const ConstVector& u, double scale, MutableVector r) const override;
   void tangent(const ConstVector& u, double scale, const Scatter& map,
                MutableVector values) const override;
+  void tangent(const ConstVector& u, double scale, const LowerScatter& map,
+               MutableVector values) const override;
   VolumeRatio volume_ratio(const ConstVector&) const override { return {}; }
 
  private:
@@ -35,6 +37,9 @@ class Sliding final : public Term {
   Projection land(const ConstVector& u, Points& moved) const;
   /// Tangent of node i over its stiffness.
   Eigen::Matrix3d stiffness_block(const Projection& at, Eigen::Index i) const;
+  /// Call use(i, scale · tangent of node i, row-major) for each node.
+  template <class Use>
+  void each_block(const ConstVector& u, double scale, Use use) const;
 
   std::shared_ptr<const Vector> points_;
   std::vector<Index> nodes_;

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 namespace supple {
@@ -32,19 +33,34 @@ struct Scatter {
   std::vector<Index> row_stride; ///< (cells, m + s) from one row of local node a to its next row
 };
 
-/// Node graph of a mesh and the CSR pattern of its stiffness matrix.
-struct BlockPattern {
+/// Which nodes share a cell.
+struct NodeGraph {
   Index nodes = 0;
   std::vector<Index> home;       ///< (scalars) the node whose neighbours a scalar shares
   std::vector<Index> node_start; ///< (nodes + scalars + 1) offsets into `neighbour`
   std::vector<Index> neighbour;  ///< nodes that share a cell with a node, itself too, ascending
-  std::vector<Index> row_start;  ///< (dofs + 1) CSR offsets
-  std::vector<Index> column;     ///< (nonzeros) CSR columns
-  std::vector<Scatter> scatter;  ///< one for each connectivity, in the order given
 
   Index scalars() const { return static_cast<Index>(home.size()); }
   Index dofs() const { return 3 * nodes + scalars(); }
+  Index width(Index a) const { return a < nodes ? 3 : 1; }
   Index first_dof(Index a) const { return a < nodes ? 3 * a : a + 2 * nodes; }
+  /// Entry of `neighbour` that says that `b` is one of `a`, −1 if the nodes share no cell.
+  Index find(Index a, Index b) const;
+};
+
+/// A node without cells keeps itself as neighbour. Cost O(cells m²).
+/// @param home (scalars) the node whose neighbours each scalar shares; empty where there are none.
+/// @throws ShapeError if a cell names a node outside [0, nodes + scalars), or the matrix exceeds
+/// 2³¹ entries.
+NodeGraph node_graph(Index nodes, const std::vector<Connectivity>& connectivities,
+                     std::vector<Index> home = {});
+
+/// Node graph of a mesh and the CSR pattern of its stiffness matrix.
+struct BlockPattern : NodeGraph {
+  std::vector<Index> row_start; ///< (dofs + 1) CSR offsets
+  std::vector<Index> column;    ///< (nonzeros) CSR columns
+  std::vector<Scatter> scatter; ///< one for each connectivity, in the order given
+
   Index nonzeros() const { return static_cast<Index>(column.size()); }
   /// From one row of node `a` to its next row: the length of its rows.
   Index row_stride(Index a) const;
@@ -55,11 +71,11 @@ struct BlockPattern {
 /// Pattern of a mesh with `nodes` nodes, and the scatter map of each connectivity.
 ///
 /// A node without cells keeps its diagonal block. Cost O(cells m² log).
-/// @param home (scalars) the node whose neighbours each scalar shares; empty where there are none.
-/// @throws ShapeError if a cell names a node outside [0, nodes + scalars), has a scalar before a
-/// node, or the matrix exceeds 2³¹ entries.
+/// @throws ShapeError as node_graph, and if a cell has a scalar before a node.
 BlockPattern block_pattern(Index nodes, const std::vector<Connectivity>& connectivities,
                            std::vector<Index> home = {});
+/// The same from the graph of these connectivities.
+BlockPattern block_pattern(NodeGraph graph, const std::vector<Connectivity>& connectivities);
 
 /// values += cell matrix: entry (r, c) of the row-major (d × d) matrix, d = 3m + s, is
 /// `matrix[(r·d + c)·step]`.
@@ -128,6 +144,36 @@ struct Reduction {
 /// @throws ShapeError if `free` does not have one entry for each dof.
 Reduction reduce(const BlockPattern& pattern, const Mask& free, Storage storage);
 
+/// The lower triangle, without the CSR matrix that it would be taken from: `source` stays empty.
+/// @throws ShapeError if `free` does not have one entry for each dof.
+Reduction reduce_lower(const NodeGraph& graph, const Mask& free);
+
+/// Where the cell matrices of one connectivity go in the values of a reduced lower triangle.
+///
+/// Block (a, b ≤ a) of a cell has its first entry at `position`. If node a is numbered above node b
+/// its rows are rows of the matrix, and its second column is `step[b]` further on, its third
+/// 2·step[b] − 1; if below, they are columns, and `step[a]` counts. This holds where all dofs of
+/// the two are free; if some are fixed `position` is −2 − e, and `entry[e + i·width(b) + j]` is the
+/// place of entry (i, j), −1 where there is none.
+struct LowerScatter {
+  Index cells = 0;
+  Index nodes_per_cell = 0;    ///< m with three dofs
+  Index scalars_per_cell = 0;  ///< s with one, behind them
+  std::vector<Index> position; ///< (cells, (m + s)(m + s + 1)/2) row by row; −1: nothing is free
+  std::vector<Index> entry;    ///< of the blocks that are free in part
+  std::shared_ptr<const std::vector<Index>> step; ///< (nodes + scalars)
+
+  std::ptrdiff_t blocks() const {
+    const std::ptrdiff_t all = nodes_per_cell + scalars_per_cell;
+    return all * (all + 1) / 2;
+  }
+};
+
+/// @param reduction of storage Lower, of the same graph.
+/// @throws ShapeError if a cell has a scalar before a node, or names nodes that share no cell.
+std::vector<LowerScatter> lower_scatter(const NodeGraph& graph, const Reduction& reduction,
+                                        const std::vector<Connectivity>& connectivities);
+
 /// Where the CSR values hold the transposed entry of each that `reduction`, of storage Lower,
 /// takes.
 /// @throws ShapeError if it stores the full matrix.
@@ -141,8 +187,9 @@ struct Colouring {
   Index colours() const { return static_cast<Index>(offset.size()) - 1; }
 };
 
-/// Greedy first-fit colouring in the order of the cells: depends on nothing but its arguments.
-/// With `batch` = 1 a batch is a cell.
+/// Greedy first-fit colouring in the order of the batches: depends on nothing but its arguments.
+/// With `batch` = 1 a batch is a cell. Cost O(cells m), where batches are many cells that lie
+/// together.
 /// @throws ShapeError if a cell names a node outside [0, nodes), or batch < 1.
 Colouring colour_cells(const Connectivity& cells, Index nodes, Index batch = 1);
 

@@ -68,11 +68,18 @@ class System {
   Vector external(const ConstVector& u) const;
   VolumeRatio volume_ratio(const ConstVector& u) const;
 
+  /// Which nodes the terms couple.
+  const NodeGraph& graph();
+  /// CSR pattern of all dofs; symmetric kinds need it for full_tangent() only.
   const BlockPattern& pattern();
-  /// CSR values on pattern() of K at u.
-  const Vector& assemble_tangent(const ConstVector& u, double load_factor);
-
   const Reduction& reduction();
+  /// K at u: of symmetric kinds straight into the values of reduction().pattern, else in CSR.
+  void assemble_tangent(const ConstVector& u, double load_factor);
+  /// Values on reduction().pattern of the tangent last assembled.
+  const Vector& reduced_tangent();
+  /// CSR values on pattern() of the tangent last assembled; of symmetric kinds made when asked for.
+  const Vector& full_tangent();
+
   /// Factorise the reduced tangent last assembled, plus `shift` times its diagonal's mean size.
   FactorStatus factorise(double shift = 0.0);
   /// The same without asking it to be positive definite (symmetric kinds only).
@@ -101,19 +108,22 @@ class System {
   bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
   bool keeps() const { return method_ == Method::Kept && kind() == Kind::Cholesky; }
   FactorStatus prepare_inverse();
-  void gather();
   const NodeRotations& rotations();
   void solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x);
   void count_work();
   void count_kept();
   void forget_factors();
+  std::vector<Connectivity> connectivities() const;
+  void assemble_full();
 
   std::shared_ptr<Vector> points_;
   std::vector<Index> home_;
   std::vector<std::shared_ptr<Term>> terms_;
   Mask free_;
+  std::unique_ptr<NodeGraph> graph_;
   std::unique_ptr<BlockPattern> pattern_;
   std::unique_ptr<Reduction> reduction_;
+  std::vector<LowerScatter> lower_; // of each term, where the kind is symmetric
   std::unique_ptr<Factor> factor_, indefinite_;
   Factor* current_ = nullptr;             // the one that factorised last
   Definite definite_ = Definite::Unknown; // of what current_ factorised
@@ -122,8 +132,10 @@ class System {
   std::unique_ptr<NodeRotations> rotations_; // outlives symmetric_
   std::unique_ptr<SymmetricSolver> symmetric_;
   Method method_ = Method::Direct;
-  Vector values_, reduced_;
-  Vector at_; // u of values_
+  Vector lower_values_, values_, reduced_;
+  Vector at_;                 // u of the tangent last assembled
+  double load_factor_ = 0.0;  // and its loads
+  bool full_is_made_ = false; // values_ are of it
 };
 
 } // namespace supple

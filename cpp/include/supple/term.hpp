@@ -17,13 +17,14 @@ struct VolumeRatio {
 
 /// What a term does with u: node-major displacements of all nodes (3n), then the scalars.
 ///
-/// Signs: residual = internal − external force. Thread counts do not change a result: sums run over
-/// batches of cells in a fixed order.
+/// Signs: residual = internal − external force. Thread counts do not change a bit of a result: sums
+/// run over batches of cells in a fixed order.
 class Term {
  public:
   virtual ~Term() = default;
 
-  /// (cells, nodes per cell) nodes, then scalars, that this term couples; no rows where constant.
+  /// (cells, nodes per cell) nodes, then scalars, that its tangent couples, in the order of the
+  /// maps that it takes; no rows where it has none.
   virtual const Connectivity& cells() const = 0;
   /// Whether energy() is the potential of residual().
   virtual bool has_energy() const = 0;
@@ -34,6 +35,9 @@ class Term {
   virtual void residual(const ConstVector& u, double scale, MutableVector r) const = 0;
   /// values += scale · tangent, at the places that `map` gives.
   virtual void tangent(const ConstVector& u, double scale, const Scatter& map,
+                       MutableVector values) const = 0;
+  /// The same of a symmetric tangent on the lower triangle of the free dofs.
+  virtual void tangent(const ConstVector& u, double scale, const LowerScatter& map,
                        MutableVector values) const = 0;
   /// Smallest J over the points of the cells; infinity for a term without volume.
   virtual VolumeRatio volume_ratio(const ConstVector& u) const = 0;
@@ -59,6 +63,7 @@ class NodalForce final : public Term {
     r.head(forces_.size()) -= scale * forces_;
   }
   void tangent(const ConstVector&, double, const Scatter&, MutableVector) const override {}
+  void tangent(const ConstVector&, double, const LowerScatter&, MutableVector) const override {}
   VolumeRatio volume_ratio(const ConstVector&) const override { return {}; }
 
  private:
