@@ -90,13 +90,15 @@ Vector NodeRotations::along_arcs(const ConstVector& u, const ConstVector& d) con
   return result;
 }
 
-void NodeRotations::turn(const Rotations& from, const Rotations& to, const Vector& x,
-                         Vector& y) const {
-  if (&x != &y) y = x;
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    const Eigen::Vector3d v = from[k].transpose() * x.segment<3>(nodes_[k].unknown);
-    y.segment<3>(nodes_[k].unknown) = to[k] * v;
-  }
+void NodeRotations::turn(const Rotations& q, Vector& x) const {
+  for (std::size_t k = 0; k < nodes_.size(); ++k)
+    x.segment<3>(nodes_[k].unknown) = (q[k] * x.segment<3>(nodes_[k].unknown)).eval();
+}
+
+void NodeRotations::turn_back(const Rotations& q, const Vector& x, Vector& y) const {
+  y = x;
+  for (std::size_t k = 0; k < nodes_.size(); ++k)
+    y.segment<3>(nodes_[k].unknown) = q[k].transpose() * x.segment<3>(nodes_[k].unknown);
 }
 
 } // namespace supple

@@ -20,8 +20,10 @@ class NodeRotations {
 
   /// Rotations from rest to `u` (dofs).
   Rotations at(const ConstVector& u) const;
-  /// y = Q x, Q = `to` `from`ᵀ of each node; or Qᵀ x. (unknowns), y may be x.
-  void turn(const Rotations& from, const Rotations& to, const Vector& x, Vector& y) const;
+  /// x := Q x, block by block (unknowns).
+  void turn(const Rotations& q, Vector& x) const;
+  /// y = Qᵀ x, both (unknowns) and not the same.
+  void turn_back(const Rotations& q, const Vector& x, Vector& y) const;
 
   /// The way d (dofs) from `u` with the turn that it makes: each node goes on along an arc, its
   /// velocity turning with the curl of d there, instead of straight on, which stretches what turns.

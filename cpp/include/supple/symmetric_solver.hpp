@@ -54,6 +54,8 @@ class SymmetricSolver {
 
  private:
   FactorStatus renew();
+  void set_turn();
+  bool cheap_to_probe(double size) const;
   CgReport iterate(const Vector& rhs, double tolerance, bool probe, Vector& x);
 
   const CscPattern& pattern_;
@@ -61,10 +63,11 @@ class SymmetricSolver {
   std::unique_ptr<SymmetricProduct> product_;
   MakePreconditioner make_;
   std::unique_ptr<Preconditioner> kept_;
-  std::vector<Eigen::Matrix3d> turned_, turn_; // rotations where it was made, and now
-  bool usable_ = false;                        // it was made, and that was ok
-  bool fresh_ = false;                         // of the matrix at hand
-  bool worn_ = false;                          // a new one would have cost less
+  std::vector<Eigen::Matrix3d> turned_, turn_, since_; // rotations where it was made, now, between
+  bool usable_ = false;                                // it was made, and that was ok
+  bool fresh_ = false;                                 // of the matrix at hand
+  bool worn_ = false;                                  // a new one would have cost less
+  double spread_ = 0.0; // of the last matrix solved with, seen through what is kept
   Definite definite_ = Definite::Unknown;
   const Vector* values_ = nullptr;
 };
