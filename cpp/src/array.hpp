@@ -1,6 +1,8 @@
 /// Memory for numbers that are all written before they are read.
 #pragma once
 
+#include <sys/mman.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -22,7 +24,10 @@ class ArrayOf {
       values_.reset();
       size_ = 0;
       const std::size_t bytes = static_cast<std::size_t>(size) * sizeof(T);
-      values_.reset(static_cast<T*>(std::aligned_alloc(kAlign, (bytes / kAlign + 1) * kAlign)));
+      const std::size_t align = bytes < 4 * kHugePage ? kAlign : kHugePage;
+      const std::size_t whole = (bytes / align + 1) * align;
+      values_.reset(static_cast<T*>(std::aligned_alloc(align, whole)));
+      if (align == kHugePage && values_) madvise(values_.get(), whole, MADV_HUGEPAGE);
       if (!values_)
         throw NumericalError(
             "the factorisation ran out of memory; use a coarser mesh or a lower order");
@@ -33,7 +38,7 @@ class ArrayOf {
   T* get() const { return values_.get(); }
 
  private:
-  static constexpr std::size_t kAlign = 64;
+  static constexpr std::size_t kAlign = 64, kHugePage = 1 << 21;
   struct Free {
     void operator()(T* values) const { std::free(values); }
   };

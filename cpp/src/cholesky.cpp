@@ -26,6 +26,7 @@ using strips::Run;
 constexpr double kWorthThreads = 1e8; // flops of a factorisation above which a second thread pays
 constexpr int kBranches = 4;          // shares for each thread
 constexpr Index kPanel = 128;         // columns that are eliminated together
+constexpr Index kColumns = 48;        // columns of a child's update that one thread adds
 constexpr Index kRows = 192;          // rows whose part of a panel stays in the second cache
 
 std::size_t at(std::int64_t i) {
@@ -64,9 +65,9 @@ class Cholesky final : public Backend {
   Inertia inertia() const override {
     return {0, 0, static_cast<std::int64_t>(tree().order.size()), 1.0};
   }
-  double flops() const override { return analysis_->flops; }
-  double nonzeros() const override { return analysis_->nonzeros; }
-  const char* ordering() const override { return analysis_->ordering; }
+  double flops() const override { return analysis_->analysis->symbolic.flops; }
+  double nonzeros() const override { return analysis_->analysis->symbolic.nonzeros; }
+  const char* ordering() const override { return analysis_->analysis->ordering; }
 
  private:
   const SupernodeTree& tree() const { return analysis_->tree; }
@@ -199,17 +200,16 @@ class Cholesky final : public Backend {
     const Index begin = to_panel ? 0 : inside, end = to_panel ? inside : m;
     for (Index i = begin; i < end; ++i)
       column[i] = static_cast<std::uint32_t>((place[i] - (to_panel ? 0 : f.columns)) * S);
-    for (Index i = begin; i < m; ++i)
-      row[i] = to_panel ? panel_row(f, place[i]) : update_row(place[i] - f.columns);
+    for (Index i = begin / S * S; i < m; ++i)
+      row[i] = to_panel ? panel_row(f, place[i]) : update_row(std::max(place[i] - f.columns, 0));
     T* const to = to_panel ? panel(f) : update(f);
-    share_strips(worker, {begin / S, strips::whole(m, S)}, false, [&](Run strips) {
-      for (Index t = strips.begin; t < strips.end; ++t) {
-        const Index lanes = std::min<Index>(S, m - t * S);
-        const T* const from = update(child) + strips::triangle(t, S);
-        kernels_.scatter(to, row + t * S, column, from, {begin, std::min(end, t * S)}, {0, lanes});
-        for (Index j = std::max(begin, t * S); j < std::min(end, t * S + lanes); ++j)
-          kernels_.scatter(to, row + t * S, column, from, {j, j + 1}, {j - t * S, lanes});
-      }
+    // By columns, for a strip of the target may take rows from two of the child's.
+    const Index step = worker.team == nullptr ? end - begin : kColumns;
+    worker.share((end - begin + step - 1) / step, [&](int i) {
+      const Run columns{begin + i * step, std::min(begin + (i + 1) * step, end)};
+      for (Index t = columns.begin / S; t * S < m; ++t)
+        kernels_.scatter(to, row + t * S, column, update(child) + strips::triangle(t, S), t,
+                         columns, std::min<Index>(S, m - t * S));
     });
   }
   std::uint32_t panel_row(const Supernode& f, Index place) const {

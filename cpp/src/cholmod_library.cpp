@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "group_graph.hpp"
 #include "suitesparse.hpp"
 
 namespace supple {
@@ -44,15 +43,28 @@ void CholmodLibrary::analyse(const CscPattern& lower) {
   release();
   cholmod_sparse matrix = lower_view(lower.start, lower.row);
   const GroupGraph graph(lower);
-  cholmod_sparse nodes = lower_view(graph.start, graph.row);
-  std::vector<std::int64_t> order(nodes.nrow);
-  if (cholmod_l_amd(&nodes, nullptr, 0, as_long(order), &common) != 0)
-    keep_if_better(matrix, graph.expand(order), "AMD");
-#ifndef NPARTITION
-  if (cholmod_l_metis(&nodes, nullptr, 0, 1, as_long(order), &common) != 0)
-    keep_if_better(matrix, graph.expand(order), "METIS");
-#endif
+  GroupOrders orders(graph);
+  keep_if_better(matrix, graph.expand(orders.amd()), "AMD");
+  if (orders.metis()) keep_if_better(matrix, graph.expand(orders.order), "METIS");
   if (factor == nullptr) require_ok("analysis");
+}
+
+GroupOrders::GroupOrders(const GroupGraph& graph)
+    : order(graph.start.size() - 1), nodes_(lower_view(graph.start, graph.row)) {}
+
+const std::vector<std::int64_t>& GroupOrders::amd() {
+  cholmod_l_amd(&nodes_, nullptr, 0, as_long(order), &library_.common);
+  library_.require_ok("ordering");
+  return order;
+}
+
+bool GroupOrders::metis() {
+#ifndef NPARTITION
+  const SerialOpenMp serial;
+  return cholmod_l_metis(&nodes_, nullptr, 0, 1, as_long(order), &library_.common) != 0;
+#else
+  return false;
+#endif
 }
 
 void CholmodLibrary::keep_if_better(cholmod_sparse& matrix, std::vector<std::int64_t> order,

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "supple/sparse.hpp"
+#include "group_graph.hpp"
 
 namespace supple {
 
@@ -52,6 +52,21 @@ struct CholmodLibrary {
 
  private:
   void keep_if_better(cholmod_sparse& matrix, std::vector<std::int64_t> order, const char* name);
+};
+
+/// Orders of the groups of a pattern.
+class GroupOrders {
+ public:
+  explicit GroupOrders(const GroupGraph& graph);
+  std::vector<std::int64_t> order; ///< (groups) the one found last
+  /// Approximate minimum degree. @throws NumericalError out of memory.
+  const std::vector<std::int64_t>& amd();
+  /// Nested dissection; false where CHOLMOD was built without METIS or that failed.
+  bool metis();
+
+ private:
+  CholmodLibrary library_{CHOLMOD_SIMPLICIAL};
+  cholmod_sparse nodes_;
 };
 
 /// CHOLMOD's header on a lower triangle of ours; CHOLMOD does not write through it.

@@ -31,5 +31,6 @@ std::unique_ptr<Backend> make_cholmod(Kind kind);
 std::unique_ptr<Backend> make_umfpack();
 std::unique_ptr<Backend> make_supernodal(Kind kind);
 std::unique_ptr<Backend> make_cholesky(Precision precision);
+std::unique_ptr<Backend> make_pardiso(Kind kind);
 
 } // namespace supple

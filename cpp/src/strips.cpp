@@ -3,8 +3,6 @@
 namespace supple::strips {
 namespace {
 
-#include "strips_body.hpp"
-
 #if defined(__AVX512F__)
 constexpr int kBytes = 64;
 constexpr int kColumns = 8;
@@ -12,6 +10,13 @@ constexpr int kColumns = 8;
 constexpr int kBytes = 32;
 constexpr int kColumns = 4;
 #endif
+#if defined(__AVX2__)
+constexpr bool kShuffles = true; ///< lanes can change places at no cost
+#else
+constexpr bool kShuffles = false;
+#endif
+
+#include "strips_body.hpp"
 
 } // namespace
 

@@ -44,10 +44,11 @@ struct Kernels {
   void (*divide)(T* panel, Index k, Run strips, Run columns);
   /// Rows `strips` of a triangle := −L Lᵀ, `below` (k columns) are all its rows of L.
   void (*outer)(T* triangle, const T* below, Index k, Run strips);
-  /// To columns of a front, for the rows of one strip: to[row[lane] + column[j]] +=
-  /// from[j·lanes + lane] for lanes [first, last) and columns j.
+  /// What strip s of a triangle adds to another front, for `lanes` rows and columns j:
+  /// to[row[lane] + column[j]] += from[j·lanes + lane] where lane + s·lanes ≥ j. Other rows of the
+  /// strips that it meets are written too, with what they hold.
   void (*scatter)(T* to, const std::uint32_t* row, const std::uint32_t* column, const T* from,
-                  Run columns, Run rows);
+                  Index s, Run columns, Index lanes);
   /// x (whole strips) := L⁻¹ x with the diagonal block of k columns; below (whole strips) −=
   /// L₂₁ x.
   void (*forward)(const T* panel, Index k, Index strips, T* x, T* below);

@@ -2,11 +2,24 @@
 /// in an unnamed namespace, and includes nothing: a function shared between units would be the one
 /// of whichever instruction set the linker takes.
 
+template <class T>
+struct IntegerLike;
+template <>
+struct IntegerLike<float> {
+  using type = std::int32_t;
+};
+template <>
+struct IntegerLike<double> {
+  using type = std::int64_t;
+};
+
 template <class T, int Bytes, int Columns>
 struct Strips {
   static constexpr int S = Bytes / static_cast<int>(sizeof(T)); ///< lanes
   static constexpr int N = Columns;                             ///< columns of a tile, N divides S
+  using Lane = typename IntegerLike<T>::type;
   typedef T V __attribute__((vector_size(Bytes), may_alias));
+  typedef Lane L __attribute__((vector_size(Bytes), may_alias));
 
   static V load(const T* at) { return *reinterpret_cast<const V*>(at); }
   static void store(T* at, V value) { *reinterpret_cast<V*>(at) = value; }
@@ -190,18 +203,67 @@ struct Strips {
     return -1;
   }
 
-  static void scatter(T* to, const std::uint32_t* row, const std::uint32_t* column, const T* from,
-                      Run columns, Run rows) {
-    if (rows.begin == 0 && rows.end == S) {
-      for (Index j = columns.begin; j < columns.end; ++j)
-#pragma GCC unroll 16
-        for (int lane = 0; lane < S; ++lane)
-          to[row[lane] + column[j]] += from[j * S + lane];
-      return;
+  /// The lanes of a strip that go to the same strip of another front.
+  struct Piece {
+    std::uint32_t base; // of that strip
+    int last;           // lane of ours
+    alignas(Bytes) Lane source[S], mask[S];
+  };
+  static constexpr int kPieces = 4; ///< above so many it is quicker to go by lanes
+
+  /// Sort `lanes` rows into pieces: how many, or 0 for too many.
+  static int pieces(Piece (&piece)[kPieces], const std::uint32_t* row, int lanes) {
+    int count = 0;
+    for (int lane = 0; lane < lanes; ++lane) {
+      const std::uint32_t to = row[lane] % S, base = row[lane] - to;
+      if (count == 0 || piece[count - 1].base != base) {
+        if (count == kPieces) return 0;
+        Piece& fresh = piece[count++];
+        fresh.base = base;
+        for (int i = 0; i < S; ++i)
+          fresh.source[i] = fresh.mask[i] = 0;
+      }
+      piece[count - 1].source[to] = lane;
+      piece[count - 1].mask[to] = -1;
+      piece[count - 1].last = lane;
     }
+    return count;
+  }
+
+  static void scatter_lanes(T* to, const std::uint32_t* row, const std::uint32_t* column,
+                            const T* from, Index s, Run columns, int lanes) {
     for (Index j = columns.begin; j < columns.end; ++j)
-      for (Index lane = rows.begin; lane < rows.end; ++lane)
+      for (Index lane = j < s * S ? 0 : j - s * S; lane < lanes; ++lane)
         to[row[lane] + column[j]] += from[j * S + lane];
+  }
+
+  static void scatter(T* to, const std::uint32_t* row, const std::uint32_t* column, const T* from,
+                      Index s, Run columns, Index lanes) {
+    Piece piece[kPieces];
+    const int count = kShuffles ? pieces(piece, row, static_cast<int>(lanes)) : 0;
+    if (count == 0)
+      return scatter_lanes(to, row, column, from, s, columns, static_cast<int>(lanes));
+    const Index full = least(columns.end, s * S);
+    for (int n = 0; n < count; ++n) {
+      const L source = *reinterpret_cast<const L*>(piece[n].source);
+      const L mask = *reinterpret_cast<const L*>(piece[n].mask);
+      T* const base = to + piece[n].base;
+      Index j = columns.begin;
+      for (; j < full; ++j) {
+        T* const target = base + column[j];
+        store(target, load(target) + masked(__builtin_shuffle(load(from + j * S), source), mask));
+      }
+      // On the diagonal only the lanes from the column's own on.
+      const Index end = least(columns.end, s * S + piece[n].last + 1);
+      for (; j < end; ++j) {
+        T* const target = base + column[j];
+        const L below = mask & (source >= static_cast<Lane>(j - s * S));
+        store(target, load(target) + masked(__builtin_shuffle(load(from + j * S), source), below));
+      }
+    }
+  }
+  static V masked(V value, L mask) {
+    return reinterpret_cast<V>(reinterpret_cast<L>(value) & mask);
   }
 
   /// Σ_j strip(:, j) x_j of R strips, R·4 sums at once.

@@ -36,10 +36,11 @@ class Supernodal final : public Backend {
     pattern_ = &pattern;
     const int threads = omp_get_max_threads();
     analysis_ = shared_tree(pattern, threads > 1 ? kBranches * threads : 1);
-    const double entries = analysis_->nonzeros;
-    flops_ = analysis_->flops * (lu_ ? 2.0 : 1.0);
+    const Symbolic& symbolic = analysis_->analysis->symbolic;
+    const double entries = symbolic.nonzeros;
+    flops_ = symbolic.flops * (lu_ ? 2.0 : 1.0);
     nonzeros_ = lu_ ? 2.0 * entries - static_cast<double>(pattern.size) : entries;
-    ordering_ = analysis_->ordering;
+    ordering_ = analysis_->analysis->ordering;
     scale_.resize(pattern.size);
     x_.resize(pattern.size);
     pivot_.resize(lu_ ? at(pattern.size) : 0);

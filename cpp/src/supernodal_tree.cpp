@@ -7,9 +7,7 @@
 #include <mutex>
 #include <numeric>
 
-#include "cholmod_library.hpp"
 #include "strips.hpp"
-#include "suitesparse.hpp"
 #include "supple/error.hpp"
 
 namespace supple {
@@ -27,28 +25,24 @@ struct Builder {
   Index lanes;
   std::vector<Index> column, owner; // of each unknown its column, of each column its supernode
 
-  void read(const cholmod_factor& f) {
-    const auto* perm = static_cast<const Long*>(f.Perm);
-    const auto* super = static_cast<const Long*>(f.super);
-    const auto* start = static_cast<const Long*>(f.pi);
-    const auto* row = static_cast<const Long*>(f.s);
-    tree.order.assign(perm, perm + f.n);
-    column.resize(f.n);
-    owner.resize(f.n);
-    for (std::size_t j = 0; j < f.n; ++j)
-      column[at(perm[j])] = static_cast<Index>(j);
-    for (std::size_t s = 0; s < f.nsuper; ++s) {
+  void read(const Symbolic& s) {
+    tree.order = s.order;
+    tree.row = s.row;
+    column.resize(s.order.size());
+    owner.resize(s.order.size());
+    for (std::size_t j = 0; j < s.order.size(); ++j)
+      column[at(s.order[j])] = static_cast<Index>(j);
+    for (std::size_t n = 0; n + 1 < s.first.size(); ++n) {
       Supernode node;
-      node.first = static_cast<Index>(super[s]);
-      node.columns = static_cast<Index>(super[s + 1] - super[s]);
-      node.below = static_cast<Index>(start[s + 1] - start[s]) - node.columns;
-      node.rows = static_cast<std::int64_t>(tree.row.size());
-      tree.row.insert(tree.row.end(), row + start[s] + node.columns, row + start[s + 1]);
-      std::fill_n(owner.begin() + node.first, node.columns, static_cast<Index>(s));
+      node.first = s.first[n];
+      node.columns = s.first[n + 1] - s.first[n];
+      node.below = static_cast<Index>(s.start[n + 1] - s.start[n]);
+      node.rows = s.start[n];
+      std::fill_n(owner.begin() + node.first, node.columns, static_cast<Index>(n));
       tree.node.push_back(node);
     }
     tree.node.emplace_back();
-    tree.node.back().rows = static_cast<std::int64_t>(tree.row.size());
+    tree.node.back().rows = s.start.back();
   }
 
   Index strips_of(Index rows) const { return strips::whole(rows, lanes); }
@@ -257,18 +251,12 @@ CscPattern symmetric_lower(const CscPattern& full) {
   return lower;
 }
 
-bool same(const CscPattern& a, const CscPattern& b) {
-  return a.lower == b.lower && a.start == b.start && a.group == b.group && a.row == b.row;
-}
-
 } // namespace
 
 TreeReport make_tree(const CscPattern& pattern, int branches, Index lanes) {
-  CholmodLibrary library(CHOLMOD_SUPERNODAL);
-  library.analyse(pattern.lower ? pattern : symmetric_lower(pattern));
-  TreeReport report{{}, library.flops, library.nonzeros, library.ordering};
+  TreeReport report{{}, shared_analysis(pattern.lower ? pattern : symmetric_lower(pattern))};
   Builder builder{report.tree, pattern, !pattern.lower, lanes, {}, {}};
-  builder.read(*library.factor);
+  builder.read(report.analysis->symbolic);
   builder.lay_panels();
   builder.link();
   builder.place_entries();
@@ -291,7 +279,7 @@ std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int bra
   const std::lock_guard<std::mutex> lock(mutex);
   for (const std::weak_ptr<const Known>& one : known) {
     const std::shared_ptr<const Known> k = one.lock();
-    if (k && k->branches == branches && k->lanes == lanes && same(k->pattern, pattern))
+    if (k && k->branches == branches && k->lanes == lanes && k->pattern == pattern)
       return {k, &k->report};
   }
   const auto fresh = std::make_shared<const Known>(

@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "supple/sparse.hpp"
+#include "symbolic.hpp"
 
 namespace supple {
 
@@ -56,8 +56,7 @@ struct SupernodeTree {
 /// A tree, and what its ordering costs.
 struct TreeReport {
   SupernodeTree tree;
-  double flops = 0.0, nonzeros = 0.0; ///< of LLᵀ
-  const char* ordering = "none";
+  std::shared_ptr<const Analysis> analysis;
 };
 
 /// Analyse a pattern; of a full one that of A + Aᵀ, with room for U.

@@ -107,4 +107,27 @@ inline Eigen::MatrixXd random_matrix(Eigen::Index rows, Eigen::Index columns, un
   return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); });
 }
 
+/// A sparse matrix that holds the non-zero entries of a dense one.
+struct Sparse {
+  supple::CscPattern pattern;
+  supple::Vector values;
+
+  Sparse(const Eigen::MatrixXd& matrix, bool lower) {
+    std::vector<double> found;
+    pattern.size = matrix.rows();
+    pattern.lower = lower;
+    pattern.start.push_back(0);
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
+      for (Eigen::Index r = lower ? c : 0; r < matrix.rows(); ++r)
+        if (matrix(r, c) != 0.0 || r == c) {
+          pattern.row.push_back(r);
+          found.push_back(matrix(r, c));
+        }
+      pattern.start.push_back(pattern.nonzeros());
+    }
+    values =
+        Eigen::Map<const supple::Vector>(found.data(), static_cast<Eigen::Index>(found.size()));
+  }
+};
+
 } // namespace fixtures

@@ -119,6 +119,10 @@ struct CscPattern {
   std::int64_t nonzeros() const { return static_cast<std::int64_t>(row.size()); }
 };
 
+inline bool operator==(const CscPattern& a, const CscPattern& b) {
+  return a.lower == b.lower && a.start == b.start && a.group == b.group && a.row == b.row;
+}
+
 /// Which part of the reduced matrix is stored.
 enum class Storage { Lower, Full };
 
