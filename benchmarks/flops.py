@@ -46,7 +46,7 @@ def operations(mnemonic: str, operands: str) -> int:
 
 
 def _operations(path: str, first: int, last: int) -> dict[int, int]:
-    """By address in a file, whose code is mapped at its own addresses plus a constant."""
+    """By address in a library, where linkers give code equal offsets and addresses."""
     shown = subprocess.run(
         ["objdump", "-d", "--no-show-raw-insn", f"--start-address={first:#x}",
          f"--stop-address={last:#x}", path], check=True, capture_output=True, text=True,

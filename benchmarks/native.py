@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import platform
 import subprocess
 import tempfile
 from functools import cache
@@ -33,7 +34,7 @@ def load() -> ctypes.CDLL:
     contract = laws._ahead()
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "native.so"
-        red = _ONLY_X86 if _is_x86() else ()
+        red = _ONLY_X86 if platform.machine() == "x86_64" else ()
         command = ["cc", *FLAGS, *red, f"-I{contract}", str(HERE / "native.c"), "-o", str(target)]
         subprocess.run([*command, "-ldl", "-lm"], check=True)
         native = ctypes.CDLL(str(target))
@@ -41,12 +42,6 @@ def load() -> ctypes.CDLL:
         function = getattr(native, name)
         function.restype, function.argtypes = result, arguments
     return native
-
-
-def _is_x86() -> bool:
-    import platform
-
-    return platform.machine() in ("x86_64", "AMD64")
 
 
 def peak_gflops() -> float:

@@ -192,13 +192,13 @@ def ratio(above: list[Answer], below: list[Answer], key: str) -> float:
 
 def table(rows: list[Row], machine: str, left_out: list[str]) -> str:
     """Markdown."""
-    head = ("case", "code", "dofs", "iterations", "solve, ms", "best peer / this",
+    head = ("case", "code", "dofs", "iterations", "solve, ms (CPU)", "best peer / this",
             "ms an iteration [assembly / factor + solve]", "DOLFINx' assembly / this",
             "second solve, ms", "first / second", "residual", "tip error")  # fmt: skip
     lines = ["# Newton on the benchmark cantilever", "", machine, "", *output.markdown(head, (
         (
             f"{r.element} {r.law}", named(r), r.dofs,
-            r.iterations, f"**{r.total_ms:.0f}**", number(r.over_best),
+            r.iterations, spent(r), number(r.over_best),
             f"{r.iteration_ms:.1f} [{r.assembly_ms:.1f} / {r.linear_ms:.1f}]",
             number(r.assembly_over), output.digits(r.second_ms), number(r.second_over),
             f"{r.residual:.0e}", None if r.tip_error is None else f"{r.tip_error:.0e}",
@@ -214,6 +214,12 @@ def table(rows: list[Row], machine: str, left_out: list[str]) -> str:
 def named(row: Row) -> str:
     """The code, with its note where that is a word and no sentence."""
     return f"{row.code} ({row.note})" if 0 < len(row.note) <= SHORT else row.code
+
+
+def spent(row: Row) -> str:
+    """Wall time of a solve, and CPU time of the process, of rank 0 where there are two."""
+    cpu = "" if row.cpu_ms is None else f" ({row.cpu_ms:.0f})"
+    return f"**{row.total_ms:.0f}**{cpu}"
 
 
 def number(value: float | None) -> str | None:

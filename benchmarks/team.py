@@ -98,10 +98,10 @@ def assemble(given: argparse.Namespace, stack: ExitStack) -> tuple[list[Code], l
     ):
         if option is None:
             absent.append(f"{name}: not given, --{name.lower()}")
-        elif not option.exists():
-            absent.append(f"{name}: there is no {option.name} at the place given")
+        elif found := shutil.which(option):
+            codes += make(Path(found).absolute())
         else:
-            codes += make(option)
+            absent.append(f"{name}: {option.name} is no program at the place given")
     for code in codes:
         code.start(stack)
     return codes, absent
@@ -132,5 +132,5 @@ def felupe(python: Path) -> list[Code]:
 def febio(exe: Path) -> list[Code]:
     """On as many threads as there are cores."""
     threads = str(os.cpu_count())
-    command = [sys.executable, script("febio"), str(exe.resolve()), threads]
+    command = [sys.executable, script("febio"), str(exe), threads]
     return [Code(f"FEBio, {threads} threads", command, foreign=False)]
