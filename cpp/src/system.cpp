@@ -37,7 +37,6 @@ void System::forget_factors() {
 }
 
 void System::use_method(Method method) {
-  if (method != method_) symmetric_.reset();
   method_ = method;
 }
 
@@ -86,7 +85,7 @@ double System::energy(const ConstVector& u, double load_factor) const {
   const Stopwatch watch(timings.residual);
   double total = 0.0;
   for (const auto& term : terms_)
-    total += factor_of(*term, load_factor) * term->energy(u);
+    if (!term->is_silent) total += factor_of(*term, load_factor) * term->energy(u);
   return total;
 }
 
@@ -94,7 +93,7 @@ Vector System::residual(const ConstVector& u, double load_factor) const {
   const Stopwatch watch(timings.residual);
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_)
-    term->residual(u, factor_of(*term, load_factor), r);
+    if (!term->is_silent) term->residual(u, factor_of(*term, load_factor), r);
   return r;
 }
 
@@ -102,7 +101,7 @@ Vector System::external(const ConstVector& u) const {
   const Stopwatch watch(timings.residual);
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_) {
-    if (term->is_load) term->residual(u, -1.0, r);
+    if (term->is_load && !term->is_silent) term->residual(u, -1.0, r);
   }
   return r;
 }
@@ -170,7 +169,8 @@ void System::assemble_tangent(const ConstVector& u, double load_factor) {
   lower_values_.setZero(r.pattern.nonzeros());
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const double scale = factor_of(*terms_[t], load_factor);
-    if (scale != 0.0) terms_[t]->tangent(u, scale, lower_[t], lower_values_);
+    if (scale != 0.0 && !terms_[t]->is_silent)
+      terms_[t]->tangent(u, scale, lower_[t], lower_values_);
   }
 }
 
@@ -180,7 +180,8 @@ void System::assemble_full() {
   values_.setZero(p.nonzeros());
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const double scale = factor_of(*terms_[t], load_factor_);
-    if (scale != 0.0) terms_[t]->tangent(at_, scale, p.scatter[t], values_);
+    if (scale != 0.0 && !terms_[t]->is_silent)
+      terms_[t]->tangent(at_, scale, p.scatter[t], values_);
   }
   full_is_made_ = true;
 }
