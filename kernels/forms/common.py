@@ -26,6 +26,23 @@ class Composite:
 
 
 @dataclass(frozen=True)
+class PointLaw:
+    """A solid's law as a function of F alone, for kernels that write the geometry themselves.
+
+    Attributes:
+        F: coefficient of nine entries, row-major, that stands for the deformation gradient.
+        stress: the nine entries of P = dψ/dF.
+        moduli: d²ψ/dF², the lower triangle of 9 × 9 by rows; behind P where it is inverse.
+        inverse: whether the mesh is the loaded shape.
+    """
+
+    F: Any
+    stress: Any
+    moduli: Any
+    inverse: bool
+
+
+@dataclass(frozen=True)
 class Forms:
     """The kernels of one term.
 
@@ -38,6 +55,7 @@ class Forms:
         inner: fields that composites give to their parts; nobody sets them from outside.
         parts: like `kernels`, called by composites only.
         composites: kernel name → what is made of parts in C.
+        law: of which residual and tangent in lanes are made, where the form is a solid's.
     """
 
     space: Space
@@ -48,6 +66,7 @@ class Forms:
     inner: dict[str, Any] = field(default_factory=dict)
     parts: dict[str, Any] = field(default_factory=dict)
     composites: dict[str, Composite] = field(default_factory=dict)
+    law: PointLaw | None = None
 
     def is_symmetric(self, name: str) -> bool:
         """Whether a kernel or part is a second derivative: the tangent of what has an energy."""

@@ -14,7 +14,7 @@ from ffcx.codegeneration.integral_generator import IntegralGenerator
 from ffcx.ir.representation import ExpressionIR
 
 from .contraction import Block, Contraction, lower, slot
-from .expressions import Expressions
+from .expressions import Code, Expressions
 from .straight import Definitions, StraightLines, alive, symbols
 from .tables import Tables, number
 from .terminals import Terminals, access
@@ -53,6 +53,23 @@ def of_points(ir: Any, options: dict[str, Any]) -> str:
         return [f"A[{place}{entry}] += {expressions.vector(value)};" for value, entry in entries]
 
     return body.write([value for value, _ in entries], sums)
+
+
+def of_values(
+    ir: Any, options: dict[str, Any], entries: Callable[[Any], Code]
+) -> tuple[list[str], list[str | None]]:
+    """Statements that define an expression's entries at one point, and the C of each.
+
+    Args:
+        entries: C of an entry of the expression's own coefficients.
+    """
+    graph = _Graph(ir, options)
+    roots = {entry: graph.value(factor)
+             for data in graph.blocks for factor, entry in data.factor_indices_comp_indices}  # fmt: skip
+    body = _Body(graph, entries)
+    lines = body.statements(list(roots.values()))
+    count = int(np.prod(ir.expression.shape))
+    return lines, [body.vector(roots[i]) if i in roots else None for i in range(count)]
 
 
 def _weighted(
@@ -94,12 +111,18 @@ class _Graph:
 class _Body:
     """Puts a body together."""
 
-    def __init__(self, graph: _Graph) -> None:
+    def __init__(self, graph: _Graph, entries: Callable[[Any], Code] = access) -> None:
         self.tables = graph.tables
         self._partitions = graph.piecewise, graph.varying
-        self._expressions = Expressions(access)
+        self._expressions = Expressions(entries)
+        self.vector = self._expressions.vector
         self._terminals = Terminals(self.tables, self._expressions)
         self._straight = StraightLines(self._expressions)
+
+    def statements(self, roots: list[Any]) -> list[str]:
+        """C of what the roots need, all of it at one point."""
+        definitions = [d for partition in self._partitions for d in _definitions(partition)]
+        return self._straight.write(alive(definitions, roots))
 
     def write(self, roots: list[Any], sums: Callable[[Expressions], list[str]]) -> str:
         piecewise, varying = self._partitions
