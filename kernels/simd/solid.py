@@ -15,6 +15,7 @@ dh_i = dFᵀ F⁻ᵀ h_i and dc = c tr(F ∇du'). Together, b and h_j of the col
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ import numpy as np
 
 from .tables import Array, number
 
+_WORD = re.compile(r"\w+")
 _THREE = range(3)
 _PAIRS = [(i, j) for i in _THREE for j in _THREE]
 #: Entries of the lower triangle of A, rows and columns aR, in the order of `Law.entries`.
@@ -134,15 +136,17 @@ def _linear_tangent(solid: Solid, lines: list[str], A: dict[tuple[int, int], str
     K: dict[tuple[int, int, int, int], str] = {}
     for i in _THREE:
         half = [line.replace(f"h[{i}][", f"L{i}").replace("];", ";") for line in _half(A, str(i))]
-        lines += ["{", *half]
+        block = []
         for j in range(3 if solid.inverse else i + 1):
             for a, b in _PAIRS:
                 if not solid.inverse and i == j and b > a:
                     continue
                 name = K[i, a, j, b] = f"K{i}{a}{j}{b}"
-                lines.append(f"{name} = {_dot((f't{a}{b}{S}', f'L{j}{S}') for S in _THREE)};")
-                lines.append(f"A[{12 * (3 * i + 3 + a) + 3 * j + 3 + b}] += {name};")
-        lines.append("}")
+                block.append(f"{name} = {_dot((f't{a}{b}{S}', f'L{j}{S}') for S in _THREE)};")
+                block.append(f"A[{12 * (3 * i + 3 + a) + 3 * j + 3 + b}] += {name};")
+        used = set(_WORD.findall("\n".join(block)))
+        half = [line for line in half if line.split()[2] in used or line.split()[2][0] == "s"]
+        lines += ["{", *half, *block, "}"]
     lines.insert(0, f"vec {', '.join(K.values())};")
 
     def entry(i: int, a: int, j: int, b: int) -> str:
