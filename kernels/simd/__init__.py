@@ -1,4 +1,4 @@
-"""Kernels of W cells a call: FFCx's own scalar graph, written as C whose varying scalars are vectors.
+"""Kernels of W cells a call: FFCx's scalar graph as C whose varying scalars are vectors.
 
     body         FFCx's intermediate representation → the body of one C function
     tables       values of shape functions at the points, uniform numbers
