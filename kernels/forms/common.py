@@ -31,15 +31,11 @@ class PointLaw:
 
     Attributes:
         F: coefficient of nine entries, row-major, that stands for the deformation gradient.
-        stress: the nine entries of P = dψ/dF.
-        moduli: d²ψ/dF², the lower triangle of 9 × 9 by rows; behind P where it is inverse.
-        inverse: whether the mesh is the loaded shape.
+        values: the nine entries of dψ/dF, then the lower triangle of d²ψ/dF² (9 × 9) by rows.
     """
 
     F: Any
-    stress: Any
-    moduli: Any
-    inverse: bool
+    values: Any
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class Forms:
         inner: fields that composites give to their parts; nobody sets them from outside.
         parts: like `kernels`, called by composites only.
         composites: kernel name → what is made of parts in C.
-        law: of which residual and tangent in lanes are made, where the form is a solid's.
+        law: of which the tangent in lanes is made, of a solid on its loaded shape.
     """
 
     space: Space

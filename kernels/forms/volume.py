@@ -36,7 +36,7 @@ def direct(law: Law, element: str, degree: int) -> Forms:
         "points": at_points(space, degree, F, P, psi, volume_scale(space)),
     }
     fields = {"u": space.displacement, **values}
-    return Forms(space, fields, kernels, degree, law=_alone(law, space, psi, values, False))
+    return Forms(space, fields, kernels, degree)
 
 
 def inverse(law: Law, element: str, degree: int) -> Forms:
@@ -58,12 +58,10 @@ def inverse(law: Law, element: str, degree: int) -> Forms:
         "points": at_points(space, degree, F, P, psi, rest_volume),
     }
     fields = {"u": space.displacement, **values}
-    return Forms(space, fields, kernels, degree, law=_alone(law, space, psi, values, True))
+    return Forms(space, fields, kernels, degree, law=_alone(law, space, psi, values))
 
 
-def _alone(
-    law: Law, space: Any, psi: Any, values: dict[str, Any], inverse: bool
-) -> PointLaw | None:
+def _alone(law: Law, space: Any, psi: Any, values: dict[str, Any]) -> PointLaw | None:
     """The law as a function of F, unless it looks at the cell's edges too."""
     if extract_type(psi, ufl.classes.Jacobian):
         return None
@@ -73,8 +71,7 @@ def _alone(
     A = ufl.diff(P, F)
     stress = [P[p // 3, p % 3] for p in range(9)]
     moduli = [A[p // 3, p % 3, q // 3, q % 3] for p in range(9) for q in range(p + 1)]
-    both = [*stress, *moduli] if inverse else moduli
-    return PointLaw(entries, ufl.as_vector(stress), ufl.as_vector(both), inverse)
+    return PointLaw(entries, ufl.as_vector([*stress, *moduli]))
 
 
 def _prepare(law: Law, element: str) -> tuple[Any, dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The body of a solid's residual or tangent: FFCx's graph of the law at a point, within `solid`."""
+"""The body of a solid's tangent on its loaded shape: FFCx's graph of the law within `solid`."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from .terminals import index
 
 
 def write(
-    tangent: bool, law: Any, fields: dict[str, Any], made: solid.Solid, ir: Any, options: Any
+    law: Any, fields: dict[str, Any], made: solid.Solid, ir: Any, options: Any
 ) -> tuple[str, list[str]]:
     """C of the body, and the names of the fields that it reads, "u" first.
 
     Args:
-        tangent: or the residual.
         law: forms.common.PointLaw.
         fields: coefficients of the kernel by name.
         made: geometry and points.
-        ir: FFCx's representation of the law's stress, or of its moduli.
+        ir: FFCx's representation of the law's values.
         options: FFCx's.
     """
-    item = law.moduli if tangent else law.stress
-    found = ufl.algorithms.extract_coefficients(item)
+    found = ufl.algorithms.extract_coefficients(law.values)
     used = [found[p] for p in ir.expressions[0].original_coefficient_positions]
     names = [n for n, c in fields.items() if n == "u" or any(c is v for v in used)]
     starts = np.cumsum([0, *(_size(fields[n]) for n in names)])
@@ -42,7 +40,7 @@ def write(
 
         return of_values(ir.expressions[0], options, entry)
 
-    return (solid.tangent if tangent else solid.residual)(made, values), names
+    return solid.tangent(made, values), names
 
 
 def _size(coefficient: Any) -> int:

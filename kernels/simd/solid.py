@@ -1,13 +1,10 @@
-"""Residual and tangent of a solid from dψ/dF and d²ψ/dF² at each point, geometry written by hand.
+"""Tangent of a solid on its loaded shape from dψ/dF and d²ψ/dF² at each point, the rest by hand.
 
-FFCx differentiates through the cell's geometry, so that products of its inverse Jacobian are in
-every entry; here its graph is that of the law alone, a function of F. With L = ∂ξ/∂X (the inverse
-of the Jacobian at rest), h_i = Lᵀ ∂φ_i/∂ξ, P = dψ/dF, A = d²ψ/dF² and a volume c at rest,
-
-    R_i[a] = c Σ P[aR] h_i[R]                 K_ij[a, b] = c Σ h_i[R] A[aR, bS] h_j[S]
-
-On the loaded shape the unknown is u' with F = (I + ∇u')⁻¹, so that dF = -F ∇du' F,
-dh_i = dFᵀ F⁻ᵀ h_i and dc = c tr(F ∇du'). Together, b and h_j of the column's node,
+The unknown is u' with F = (I + ∇u')⁻¹; FFCx would differentiate through that inverse and through
+the cell's geometry, whose products would then be in every entry. Here its graph is that of the law
+alone, a function of F. With L = ∂ξ/∂X (to the reference cell from the shape at rest),
+h_i = Lᵀ ∂φ_i/∂ξ, P = dψ/dF, A = d²ψ/dF² and the volume c at rest, R_i[a] = c Σ P[aR] h_i[R]. From
+dF = -F ∇du' F follow dh_i = dFᵀ F⁻ᵀ h_i and dc = c tr(F ∇du'); together, b of the column's node j,
 
     K_ij[a, b] = c Σ h_i[R] B[aR, bS] h_j[S],
     B[aR, bS] = P[aR] δ_bS - P[aS] δ_Rb - Σ_k A[aR, kS] F[kb]
@@ -15,37 +12,36 @@ dh_i = dFᵀ F⁻ᵀ h_i and dc = c tr(F ∇du'). Together, b and h_j of the col
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from .tables import Array, number
 
-_WORD = re.compile(r"\w+")
 _THREE = range(3)
 _PAIRS = [(i, j) for i in _THREE for j in _THREE]
-#: Entries of the lower triangle of A, rows and columns aR, in the order of `Law.entries`.
+#: Entries of the lower triangle of A, rows and columns aR, in their order.
 LOWER = [(p, q) for p in range(9) for q in range(p + 1)]
 
+#: Entries (aR, bS) of a tensor in C; those that vanish are None or not there.
+Tensor = dict[tuple[int, int], str | None]
 #: (names of F's entries) → (statements, C of the values; None where it vanishes)
 Values = Callable[[list[str]], tuple[list[str], list[str | None]]]
 
 
 @dataclass(frozen=True)
 class Solid:
-    """What a kernel is written from.
+    """Shape functions and points.
 
     Attributes:
         gradients: of the shape functions (points, nodes, 3) on the reference cell.
         weights: of the points (points,).
-        inverse: whether the mesh is the loaded shape.
     """
 
     gradients: Array
     weights: Array
-    inverse: bool
 
     @property
     def is_linear(self) -> bool:
@@ -54,119 +50,76 @@ class Solid:
         return self.gradients.shape == (1, 4, 3) and np.array_equal(self.gradients[0], unit)
 
 
-def residual(solid: Solid, stress: Values) -> str:
-    """C of the body that adds R to A; ``stress`` gives the nine entries of P."""
-    lines, P = stress(_names("F"))
-    lines += [_const(f"Q{a}{r}", f"c * ({_dot((P[3 * a + R], f'L{r}{R}') for R in _THREE)})")
-              for a, r in _PAIRS]  # fmt: skip
-    if solid.is_linear:
-        lines += [f"A[{3 * r + 3 + a}] += Q{a}{r};" for a, r in _PAIRS]
-        lines += [f"A[{a}] -= Q{a}0 + Q{a}1 + Q{a}2;" for a in _THREE]
-        return "\n".join([*_linear_geometry(solid), *lines])
-    sums = (f"A[3 * i + {a}] += Q{a}0 * d[0] + Q{a}1 * d[1] + Q{a}2 * d[2];" for a in _THREE)
-    return _over_points(solid, [*lines, *_over_nodes(solid, sums)])
-
-
-def tangent(solid: Solid, moduli: Values) -> str:
-    """C of the body that adds K to A, its lower triangle where it is symmetric.
-
-    Args:
-        moduli: gives the entries `LOWER` of A; where the mesh is the loaded shape behind P's nine.
-    """
-    lines, entries = moduli(_names("F"))
-    P, entries = (entries[:9], entries[9:]) if solid.inverse else ([], entries)
-    A: dict[tuple[int, int], str | None] = {}
-    for (p, q), value in zip(LOWER, entries, strict=True):
+def tangent(solid: Solid, values: Values) -> str:
+    """C of the body that adds K to A; ``values`` gives P's nine entries, then `LOWER` of A's."""
+    lines, entries = values([f"F{a}{R}" for a, R in _PAIRS])
+    A: Tensor = {}
+    for (p, q), value in zip(LOWER, entries[9:], strict=True):
         A[p, q] = A[q, p] = value
-    if solid.inverse:
-        lines += _pulled_back(A, P)
+    definitions, B = _with_moving_geometry(A, entries[:9])
     write = _linear_tangent if solid.is_linear else _tangent
-    return write(solid, lines, A)
+    return write(solid, [*lines, *definitions], B)
 
 
-def _pulled_back(A: dict[tuple[int, int], str | None], P: list[str | None]) -> list[str]:
-    """Statements that define B; A becomes B."""
-    lines, B = [], {}
-    for a, R in _PAIRS:
-        for b, S in _PAIRS:
-            text = "".join(f" - {A[3 * a + R, 3 * k + S]} * F{k}{b}"
-                           for k in _THREE if A[3 * a + R, 3 * k + S])  # fmt: skip
-            plus, minus = P[3 * a + R] if b == S else None, P[3 * a + S] if b == R else None
-            if b == S == R:
-                plus = minus = None
-            text = (plus or "") + (f" - {minus}" if minus else "") + text
-            B[3 * a + R, 3 * b + S] = f"B{3 * a + R}_{3 * b + S}"
-            lines.append(_const(f"B{3 * a + R}_{3 * b + S}", text or "(vec){0}"))
-    A.update(B)
-    return lines
+def _with_moving_geometry(A: Tensor, P: list[str | None]) -> tuple[list[str], Tensor]:
+    """Statements that define B, and its entries."""
+    lines, B = [], Tensor()
+    for (a, R), (b, S) in product(_PAIRS, _PAIRS):
+        row, column = 3 * a + R, 3 * b + S
+        moduli = ((A[row, 3 * k + S], f"F{k}{b}") for k in _THREE)
+        text = "".join(f" - {value} * {f}" for value, f in moduli if value)
+        if R != S and b == R and P[3 * a + S]:
+            text = f" - {P[3 * a + S]}{text}"
+        if R != S and b == S and P[row]:
+            text = f"{P[row]}{text}"
+        if text:
+            B[row, column] = f"B{row}_{column}"
+            lines.append(_const(f"B{row}_{column}", text))
+    return lines, B
 
 
-def _tangent(solid: Solid, lines: list[str], A: dict[tuple[int, int], str | None]) -> str:
+def _tangent(solid: Solid, lines: list[str], B: Tensor) -> str:
     n = solid.gradients.shape[1]
     define = (f"h[i][{R}] = d[0] * L0{R} + d[1] * L1{R} + d[2] * L2{R};" for R in _THREE)
-    half = _half(A, "i")
-    lines = [*lines, f"vec h[{n}][3];", *_over_nodes(solid, define)]
-    rows = [f"for (int i = 0; i < {n}; ++i) {{", *half,
-            f"for (int j = 0; j < {n if solid.inverse else 'i'}; ++j) {{",
-            *_entries("i", "j", f"{3 * n}", _PAIRS), "}"]  # fmt: skip
-    if not solid.inverse:
-        rows += _entries("i", "i", f"{3 * n}", [(a, b) for a, b in _PAIRS if b <= a])
-    return _over_points(solid, [*lines, *rows, "}"])
+    entries = [f"A[(3 * i + {a}) * {3 * n} + 3 * j + {b}] += "
+               f"t{a}{b}0 * h[j][0] + t{a}{b}1 * h[j][1] + t{a}{b}2 * h[j][2];"
+               for a, b in _PAIRS]  # fmt: skip
+    return _over_points(solid, [
+        *lines, f"vec h[{n}][3];", *_over_nodes(solid, define),
+        f"for (int i = 0; i < {n}; ++i) {{", *_half(B, ["h[i][0]", "h[i][1]", "h[i][2]"]),
+        f"for (int j = 0; j < {n}; ++j) {{", *entries, "}", "}",
+    ])  # fmt: skip
 
 
-def _half(A: dict[tuple[int, int], str | None], i: str) -> list[str]:
-    """t[a, bS] = c Σ_R h_i[R] A[aR, bS]."""
-    lines = [_const(f"s{R}", f"c * h[{i}][{R}]") for R in _THREE]
+def _half(B: Tensor, h: list[str]) -> list[str]:
+    """t[a, bS] = c Σ_R h[R] B[aR, bS]."""
+    lines = [_const(f"s{R}", f"c * {h[R]}") for R in _THREE]
     for a in _THREE:
         for b, S in _PAIRS:
-            text = _dot((A[3 * a + R, 3 * b + S], f"s{R}") for R in _THREE)
+            text = _dot((B.get((3 * a + R, 3 * b + S)), f"s{R}") for R in _THREE)
             lines.append(_const(f"t{a}{b}{S}", text))
     return lines
 
 
-def _entries(i: str, j: str, width: str, pairs: Iterable[tuple[int, int]]) -> list[str]:
-    return [f"A[(3 * {i} + {a}) * {width} + 3 * {j} + {b}] += "
-            f"t{a}{b}0 * h[{j}][0] + t{a}{b}1 * h[{j}][1] + t{a}{b}2 * h[{j}][2];"
-            for a, b in pairs]  # fmt: skip
-
-
-def _linear_tangent(solid: Solid, lines: list[str], A: dict[tuple[int, int], str | None]) -> str:
+def _linear_tangent(solid: Solid, lines: list[str], B: Tensor) -> str:
     """h_i is row i - 1 of L, and all rows and columns of K sum to zero: h_0 = -h_1 - h_2 - h_3."""
     lines = [*_linear_geometry(solid), *lines]
-    K: dict[tuple[int, int, int, int], str] = {}
     for i in _THREE:
-        half = [line.replace(f"h[{i}][", f"L{i}").replace("];", ";") for line in _half(A, str(i))]
-        block = []
-        for j in range(3 if solid.inverse else i + 1):
-            for a, b in _PAIRS:
-                if not solid.inverse and i == j and b > a:
-                    continue
-                name = K[i, a, j, b] = f"K{i}{a}{j}{b}"
-                block.append(f"{name} = {_dot((f't{a}{b}{S}', f'L{j}{S}') for S in _THREE)};")
-                block.append(f"A[{12 * (3 * i + 3 + a) + 3 * j + 3 + b}] += {name};")
-        used = set(_WORD.findall("\n".join(block)))
-        half = [line for line in half if line.split()[2] in used or line.split()[2][0] == "s"]
-        lines += ["{", *half, *block, "}"]
-    lines.insert(0, f"vec {', '.join(K.values())};")
-
-    def entry(i: int, a: int, j: int, b: int) -> str:
-        return K[i, a, j, b] if (i, a, j, b) in K else K[j, b, i, a]
-
+        lines += [line.replace(" s", f" s{i}").replace(" t", f" t{i}")
+                  for line in _half(B, [f"L{i}{R}" for R in _THREE])]  # fmt: skip
+        for j, (a, b) in product(_THREE, _PAIRS):
+            text = _dot((f"t{i}{a}{b}{S}", f"L{j}{S}") for S in _THREE)
+            lines.append(_const(f"K{i}{a}{j}{b}", text))
+            lines.append(f"A[{12 * (3 * i + 3 + a) + 3 * j + 3 + b}] += K{i}{a}{j}{b};")
     for a, b in _PAIRS:
         for i in _THREE:
-            name = f"N{i}{a}{b}"
-            lines.append(_const(name, " + ".join(entry(i, a, j, b) for j in _THREE)))
-            lines.append(f"A[{12 * (3 * i + 3 + a) + b}] -= {name};")
-            if solid.inverse:
-                column = " + ".join(entry(j, a, i, b) for j in _THREE)
-                lines.append(f"A[{12 * a + 3 * i + 3 + b}] -= {column};")
-        if solid.inverse or b <= a:
-            lines.append(f"A[{12 * a + b}] += N0{a}{b} + N1{a}{b} + N2{a}{b};")
+            row = " + ".join(f"K{i}{a}{j}{b}" for j in _THREE)
+            column = " + ".join(f"K{j}{a}{i}{b}" for j in _THREE)
+            lines.append(_const(f"N{i}{a}{b}", row))
+            lines.append(f"A[{12 * (3 * i + 3 + a) + b}] -= N{i}{a}{b};")
+            lines.append(f"A[{12 * a + 3 * i + 3 + b}] -= {column};")
+        lines.append(f"A[{12 * a + b}] += N0{a}{b} + N1{a}{b} + N2{a}{b};")
     return "\n".join(lines)
-
-
-def _names(letter: str) -> list[str]:
-    return [f"{letter}{a}{b}" for a, b in _PAIRS]
 
 
 def _const(name: str, text: str) -> str:
@@ -189,27 +142,22 @@ def _inverse(of: str, to: str, determinant: str) -> list[str]:
     return lines + [_const(f"{to}{i}{j}", f"{to}{i}{j}_ * {determinant}_inv") for i, j in _PAIRS]
 
 
-def _kinematics(solid: Solid, weight: str) -> list[str]:
-    """F, L and c from J = ∂x/∂ξ and D = ∂u/∂ξ."""
-    gradient = "G" if solid.inverse else "F"
-    to_reference = "M" if solid.inverse else "L"
-    lines = _inverse("J", to_reference, "det")
-    lines += [_const(f"{gradient}{a}{R}", ("1.0 + " if a == R else "")
-                     + _dot((f"D{a}{r}", f"{to_reference}{r}{R}") for r in _THREE))
-              for a, R in _PAIRS]  # fmt: skip
-    volume = f"supple_abs(det) * {weight}"
-    if solid.inverse:
-        lines += _inverse("G", "F", "ratio")
-        lines += [_const(f"L{r}{R}", _dot((f"M{r}{k}", f"F{k}{R}") for k in _THREE))
-                  for r, R in _PAIRS]  # fmt: skip
-        volume += " * ratio"
-    return [*lines, _const("c", volume)]
+def _kinematics(weight: str) -> list[str]:
+    """F, L and c from J = ∂x/∂ξ and D = ∂u'/∂ξ; G = I + ∇u', M is the inverse of J."""
+    lines = _inverse("J", "M", "det")
+    lines += [_const(f"G{a}{k}", ("1.0 + " if a == k else "")
+                     + _dot((f"D{a}{r}", f"M{r}{k}") for r in _THREE))
+              for a, k in _PAIRS]  # fmt: skip
+    lines += _inverse("G", "F", "ratio")
+    lines += [_const(f"L{r}{R}", _dot((f"M{r}{k}", f"F{k}{R}") for k in _THREE))
+              for r, R in _PAIRS]  # fmt: skip
+    return [*lines, _const("c", f"supple_abs(det) * {weight} * ratio")]
 
 
 def _linear_geometry(solid: Solid) -> list[str]:
     lines = [_const(f"{to}{a}{r}", f"{of}[{3 * r + 3 + a}] - {of}[{a}]")
              for to, of in (("J", "x"), ("D", "w")) for a, r in _PAIRS]  # fmt: skip
-    return lines + _kinematics(solid, number(solid.weights[0]))
+    return lines + _kinematics(number(solid.weights[0]))
 
 
 def _over_points(solid: Solid, lines: list[str]) -> str:
@@ -218,14 +166,14 @@ def _over_points(solid: Solid, lines: list[str]) -> str:
     weights = ", ".join(number(v) for v in solid.weights)
     sums = [f"{to}{a}{r} += {of}[3 * i + {a}] * d[{r}];"
             for to, of in (("J", "x"), ("D", "w")) for a, r in _PAIRS]  # fmt: skip
-    nought = ", ".join(f"{name} = {{0}}" for name in (*_names("J"), *_names("D")))
+    nought = ", ".join(f"{to}{a}{r} = {{0}}" for to in "JD" for a, r in _PAIRS)
     return "\n".join([
         f"static const double slope[{points * nodes}][3] = {{{braces}}};",
         f"static const double weight[] = {{{weights}}};",
         f"for (int iq = 0; iq < {points}; ++iq) {{",
         f"vec {nought};",
         *_over_nodes(solid, sums),
-        *_kinematics(solid, "weight[iq]"),
+        *_kinematics("weight[iq]"),
         *lines,
         "}",
     ])  # fmt: skip
