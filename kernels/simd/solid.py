@@ -162,7 +162,8 @@ def _linear_geometry(solid: Solid) -> list[str]:
 
 def _over_points(solid: Solid, lines: list[str]) -> str:
     points, nodes, _ = solid.gradients.shape
-    braces = ", ".join(number(v) for v in solid.gradients.ravel())
+    rows = (", ".join(number(v) for v in row) for row in solid.gradients.reshape(-1, 3))
+    braces = ", ".join(f"{{{row}}}" for row in rows)
     weights = ", ".join(number(v) for v in solid.weights)
     sums = [f"{to}{a}{r} += {of}[3 * i + {a}] * d[{r}];"
             for to, of in (("J", "x"), ("D", "w")) for a, r in _PAIRS]  # fmt: skip
