@@ -84,6 +84,14 @@ def mixed_space(name: str) -> MixedSpace:
 
 
 @cache
+def gradients(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gradients of the shape functions at the points (q, nodes, tdim), and weights (q,)."""
+    points, weights = quadrature(name, degree)
+    values = np.moveaxis(scalar_element(name).tabulate(1, points)[1:], 0, -1)
+    near = np.rint(values)
+    return np.where(abs(values - near) < 1e-14, near, values), weights
+
+
 def quadrature(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (q, tdim) and weights (q,) on the reference cell; ``degree`` may name its scheme.
 

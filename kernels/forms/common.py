@@ -26,6 +26,19 @@ class Composite:
 
 
 @dataclass(frozen=True)
+class PointLaw:
+    """A solid's law as a function of F alone, for kernels that write the geometry themselves.
+
+    Attributes:
+        F: coefficient of nine entries, row-major, that stands for the deformation gradient.
+        values: the nine entries of dψ/dF, then the lower triangle of d²ψ/dF² (9 × 9) by rows.
+    """
+
+    F: Any
+    values: Any
+
+
+@dataclass(frozen=True)
 class Forms:
     """The kernels of one term.
 
@@ -38,6 +51,7 @@ class Forms:
         inner: fields that composites give to their parts; nobody sets them from outside.
         parts: like `kernels`, called by composites only.
         composites: kernel name → what is made of parts in C.
+        law: of which the tangent in lanes is made, of a solid on its loaded shape.
     """
 
     space: Space
@@ -48,6 +62,7 @@ class Forms:
     inner: dict[str, Any] = field(default_factory=dict)
     parts: dict[str, Any] = field(default_factory=dict)
     composites: dict[str, Composite] = field(default_factory=dict)
+    law: PointLaw | None = None
 
     def is_symmetric(self, name: str) -> bool:
         """Whether a kernel or part is a second derivative: the tangent of what has an energy."""

@@ -12,11 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 import ufl
+from ufl.algorithms.analysis import extract_type
 
 from ..elements import space as make_space
 from ..kinematics import Kinematics
 from ..reader import Law
-from .common import Forms, at_points, measure, volume_scale
+from .common import Forms, PointLaw, at_points, measure, volume_scale
 
 
 def direct(law: Law, element: str, degree: int) -> Forms:
@@ -34,7 +35,8 @@ def direct(law: Law, element: str, degree: int) -> Forms:
         "volume_ratio": at_points(space, degree, ufl.det(F)),
         "points": at_points(space, degree, F, P, psi, volume_scale(space)),
     }
-    return Forms(space, {"u": space.displacement, **values}, kernels, degree)
+    fields = {"u": space.displacement, **values}
+    return Forms(space, fields, kernels, degree)
 
 
 def inverse(law: Law, element: str, degree: int) -> Forms:
@@ -55,7 +57,21 @@ def inverse(law: Law, element: str, degree: int) -> Forms:
         "volume_ratio": at_points(space, degree, ratio),
         "points": at_points(space, degree, F, P, psi, rest_volume),
     }
-    return Forms(space, {"u": space.displacement, **values}, kernels, degree)
+    fields = {"u": space.displacement, **values}
+    return Forms(space, fields, kernels, degree, law=_alone(law, space, psi, values))
+
+
+def _alone(law: Law, space: Any, psi: Any, values: dict[str, Any]) -> PointLaw | None:
+    """The law as a function of F, unless it looks at the cell's edges too."""
+    if extract_type(psi, ufl.classes.Jacobian):
+        return None
+    entries = space.field(9)
+    F = ufl.variable(ufl.as_matrix([[entries[3 * i + j] for j in range(3)] for i in range(3)]))
+    P = ufl.diff(law.psi(Kinematics(F), values), F)
+    A = ufl.diff(P, F)
+    stress = [P[p // 3, p % 3] for p in range(9)]
+    moduli = [A[p // 3, p % 3, q // 3, q % 3] for p in range(9) for q in range(p + 1)]
+    return PointLaw(entries, ufl.as_vector([*stress, *moduli]))
 
 
 def _prepare(law: Law, element: str) -> tuple[Any, dict[str, Any]]:

@@ -1,12 +1,14 @@
-"""Kernels of W cells a call: FFCx's own scalar graph, written as C whose varying scalars are vectors.
+"""Kernels of W cells a call: FFCx's scalar graph as C whose varying scalars are vectors.
 
     body         FFCx's intermediate representation → the body of one C function
     tables       values of shape functions at the points, uniform numbers
     terminals    coordinates, unknowns and their derivatives at a point
     straight     the scalar graph: what is used, powers and divisions shared, as C
     contraction  sums over shape functions and points into the element's tensor
+    solid        tangents on loaded shapes: geometry by hand around the graph of the law alone
+    point_law    that graph, as a function of F and the parameters
     lanes        how many cells a call, and the C that every such kernel begins with
-    math.h       vector functions
+    math.h, angles.h   vector functions
 
 A vector is `vec`, LANES doubles (vector extensions of GCC and Clang); a truth is a `mask` of LANES
 integers, all bits or none; conditions choose lane by lane, so no lane ever sees another's numbers.

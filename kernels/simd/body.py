@@ -14,7 +14,8 @@ from ffcx.codegeneration.integral_generator import IntegralGenerator
 from ffcx.ir.representation import ExpressionIR
 
 from .contraction import Block, Contraction, lower, slot
-from .expressions import Expressions
+from .expressions import Code, Expressions
+from .gradients import PointTangent, PulledBack, derivatives
 from .straight import Definitions, StraightLines, alive, symbols
 from .tables import Tables, number
 from .terminals import Terminals, access
@@ -23,10 +24,7 @@ from .terminals import Terminals, access
 def of_integral(ir: Any, options: dict[str, Any], symmetric: bool) -> str:
     """C of the body of a form's one cell integral; of a symmetric one the lower triangle."""
     graph = _Graph(ir, options)
-    blocks = [Block(tuple(slot(argument.tabledata) for argument in data.ma_data),
-                    graph.value(data.factor_indices_comp_indices[0][0])) for data in graph.blocks]  # fmt: skip
-    if symmetric:
-        blocks = lower(blocks)
+    blocks = lower(graph.products()) if symmetric else graph.products()
     body = _Body(graph)
     shape = tuple(int(n) for n in ir.expression.tensor_shape)
 
@@ -40,26 +38,68 @@ def of_integral(ir: Any, options: dict[str, Any], symmetric: bool) -> str:
     return body.write([b.factor for b in blocks], sums)
 
 
+def of_tangent(ir: Any, options: dict[str, Any], tangent: PointTangent, element: Any,
+               symmetric: bool) -> str:  # fmt: skip
+    """C of the body of a tangent by values at points.
+
+    Args:
+        element: scalar element of both arguments.
+    """
+    graph = _Graph(ir, options)
+    graph.tables.weights = np.asarray(tangent.weights)
+    entries = graph.entries()
+    body = _Body(graph)
+    body.tables.values |= derivatives(element, tangent.points)
+    shape = (3 * element.dim, 3 * element.dim)
+
+    def sums(expressions: Expressions) -> list[str]:
+        values = [expressions.vector(entries[i]) for i in range(len(entries))]
+        back = PulledBack(tangent, values, symmetric)
+        blocks = back.blocks(element.dim)
+        if body.tables.points == 1:
+            body.tables.weights = np.ones(1)
+        return back.lines + Contraction(body.tables, shape, symmetric).write(blocks)
+
+    return body.write(list(entries.values()), sums)
+
+
 def of_points(ir: Any, options: dict[str, Any]) -> str:
     """C of the body of an expression's entries at points: A is (points × entries)."""
     graph = _Graph(ir, options)
-    entries = [(graph.value(factor), entry)
-               for data in graph.blocks for factor, entry in data.factor_indices_comp_indices]  # fmt: skip
+    entries = graph.entries()
     count = int(np.prod(ir.expression.shape))
     body = _Body(graph)
 
     def sums(expressions: Expressions) -> list[str]:
         place = "" if body.tables.points == 1 else f"{count} * iq + "
-        return [f"A[{place}{entry}] += {expressions.vector(value)};" for value, entry in entries]
+        return [
+            f"A[{place}{entry}] += {expressions.vector(value)};" for entry, value in entries.items()
+        ]
 
-    return body.write([value for value, _ in entries], sums)
+    return body.write(list(entries.values()), sums)
+
+
+def of_values(
+    ir: Any, options: dict[str, Any], entries: Callable[[Any], Code]
+) -> tuple[list[str], list[str | None]]:
+    """Statements that define an expression's entries at one point, and the C of each.
+
+    Args:
+        entries: C of an entry of the expression's own coefficients.
+    """
+    graph = _Graph(ir, options)
+    roots = graph.entries()
+    body = _Body(graph, entries)
+    lines = body.statements(list(roots.values()))
+    count = int(np.prod(ir.expression.shape))
+    return lines, [body.vector(roots[i]) if i in roots else None for i in range(count)]
 
 
 def _weighted(
     blocks: list[tuple[Any, str]], tables: Tables
 ) -> tuple[list[str], list[tuple[Any, str]]]:
-    """Factors times the weight of the one point, once each; the point's weight is 1 from then on."""
-    names = {factor: f"f_{k}" for k, factor in enumerate(dict.fromkeys(f for _, f in blocks))}
+    """Factors times the one point's weight, once each; that weight is 1 from then on."""
+    names = {factor: f"s_{k}" for k, factor in enumerate(dict.fromkeys(f for _, f in blocks))}
     weight = number(tables.weights[0])
     tables.weights = np.ones(1)
     lines = [f"const vec {name} = {factor} * {weight};" for factor, name in names.items()]
@@ -85,6 +125,17 @@ class _Graph:
         )
         self.tables = Tables(weights, {name: np.asarray(v[0, 0]) for name, v in values.items()})
 
+    def products(self) -> list[Block]:
+        """Of a form: its factors with what they multiply."""
+        return [Block(tuple(slot(argument.tabledata) for argument in data.ma_data),
+                      self.value(data.factor_indices_comp_indices[0][0]))
+                for data in self.blocks]  # fmt: skip
+
+    def entries(self) -> dict[int, Any]:
+        """Of point values: the expression of each entry that is not 0 throughout."""
+        return {entry: self.value(factor) for data in self.blocks
+                for factor, entry in data.factor_indices_comp_indices}  # fmt: skip
+
     def value(self, factor: int) -> Any:
         """FFCx's expression for a factor of the graph."""
         node = self._nodes[factor]["expression"]
@@ -94,12 +145,18 @@ class _Graph:
 class _Body:
     """Puts a body together."""
 
-    def __init__(self, graph: _Graph) -> None:
+    def __init__(self, graph: _Graph, entries: Callable[[Any], Code] = access) -> None:
         self.tables = graph.tables
         self._partitions = graph.piecewise, graph.varying
-        self._expressions = Expressions(access)
+        self._expressions = Expressions(entries)
+        self.vector = self._expressions.vector
         self._terminals = Terminals(self.tables, self._expressions)
         self._straight = StraightLines(self._expressions)
+
+    def statements(self, roots: list[Any]) -> list[str]:
+        """C of what the roots need, all of it at one point."""
+        definitions = [d for partition in self._partitions for d in _definitions(partition)]
+        return self._straight.write(alive(definitions, roots))
 
     def write(self, roots: list[Any], sums: Callable[[Expressions], list[str]]) -> str:
         piecewise, varying = self._partitions

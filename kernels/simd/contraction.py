@@ -127,10 +127,9 @@ class Contraction:
                     diagonal: bool) -> list[str]:  # fmt: skip
             width = self._shape[1]
             place = f"({_place(row, 0, i)}) * {width} + {_place(column, 0, j)}"
-            lines = [f"A[{place} + {a * width + b}] += {text};"
-                     for (a, b), terms in names.items()
-                     if (b <= a or not diagonal) and (text := self._sum(terms, j, False))]  # fmt: skip
-            return lines
+            return [f"A[{place} + {a * width + b}] += {text};"
+                    for (a, b), terms in names.items() if b <= a or not diagonal
+                    if (text := self._sum(terms, j, False))]  # fmt: skip
 
         def columns(i: str, names: dict[tuple[int, int], list[tuple[str, str]]]) -> list[str]:
             if self._is_known(column):

@@ -78,7 +78,7 @@ _ARRAYS = {"coordinate_dofs": "x"}
 
 
 def term(factor: float, value: str) -> str:
-    """ " + factor * value", shorter where the factor is 0, 1 or -1."""
+    """What adds factor * value to a sum, shorter where the factor is 0, 1 or -1."""
     if factor == 0.0:
         return ""
     sign = " - " if factor < 0 else " + "
