@@ -4,11 +4,13 @@
     tables       values of shape functions at the points, uniform numbers
     terminals    coordinates, unknowns and their derivatives at a point
     straight     the scalar graph: what is used, powers and divisions shared, as C
+    gradients    tangents through the derivative of stress
+    linear       coefficients of linear forms by sweeps backwards
     contraction  sums over shape functions and points into the element's tensor
     solid        tangents on loaded shapes: geometry by hand around the graph of the law alone
     point_law    that graph, as a function of F and the parameters
     lanes        how many cells a call, and the C that every such kernel begins with
-    math.h, angles.h   vector functions
+    *.h          vector functions
 
 A vector is `vec`, LANES doubles (vector extensions of GCC and Clang); a truth is a `mask` of LANES
 integers, all bits or none; conditions choose lane by lane, so no lane ever sees another's numbers.

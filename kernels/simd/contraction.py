@@ -30,13 +30,13 @@ class Slot(NamedTuple):
 
     base: int  # dof of component 0, shape function 0
     stride: int  # dofs from one shape function to the next
-    count: int  # shape functions
+    nodes: int  # shape functions
     component: int
     table: str  # "" where the one shape function is 1
 
     @property
     def space(self) -> tuple[int, int, int]:
-        return self.base, self.stride, self.count
+        return self.base, self.stride, self.nodes
 
 
 @dataclass
@@ -133,10 +133,10 @@ class Contraction:
 
         def columns(i: str, names: dict[tuple[int, int], list[tuple[str, str]]]) -> list[str]:
             if self._is_known(column):
-                last = int(i) if symmetric else column.count - 1
+                last = int(i) if symmetric else column.nodes - 1
                 return [line for j in range(last + 1)
                         for line in entries(i, str(j), names, symmetric and j == last)]  # fmt: skip
-            end = i if symmetric else str(column.count)
+            end = i if symmetric else str(column.nodes)
             loop = [f"for (int j = 0; j < {end}; ++j) {{", *entries(i, "j", names, False), "}"]
             return loop + (entries(i, i, names, True) if symmetric else [])
 
@@ -144,12 +144,12 @@ class Contraction:
 
     def _is_known(self, s: Slot) -> bool:
         """Whether a space is small and its shape functions are the same at all points."""
-        return self._tables.points == 1 and s.count * s.stride <= _WRITTEN_OUT
+        return self._tables.points == 1 and s.nodes * s.stride <= _WRITTEN_OUT
 
     def _over(self, s: Slot, name: str, body: Any) -> list[str]:
         if self._is_known(s):
-            return [line for i in range(s.count) for line in body(str(i))]
-        return [f"for (int {name} = 0; {name} < {s.count}; ++{name}) {{", *body(name), "}"]
+            return [line for i in range(s.nodes) for line in body(str(i))]
+        return [f"for (int {name} = 0; {name} < {s.nodes}; ++{name}) {{", *body(name), "}"]
 
     def _sum(self, terms: Iterable[tuple[str, str]], i: str, weighted: bool) -> str:
         """Σ table[i] factor, weighted where it is the rows'; "" where it is known to vanish."""

@@ -47,7 +47,7 @@ class Expressions:
         if isinstance(node, L.Symbol):
             return self.symbols[node.name]
         if isinstance(node, (L.LiteralFloat, L.LiteralInt)):
-            return Code(_bracketed(float(node.value)), "double")
+            return Code(_bracketed(value_of(node)), "double")
         if isinstance(node, L.ArrayAccess):
             return self._access(node)
         if isinstance(node, L.Conditional):
@@ -87,6 +87,11 @@ class Expressions:
             return self(node.args[0])
         arguments = ", ".join(self.vector(argument) for argument in node.args)
         return Code(f"{FUNCTIONS[node.function]}({arguments})", "vec")
+
+
+def value_of(literal: Any) -> float:
+    """Of a number in the graph."""
+    return float(literal.value)
 
 
 def _bracketed(value: float) -> str:

@@ -54,13 +54,13 @@ class PointTangent:
     places: list[tuple[int, int]]
 
 
-class _Constants(MultiFunction):  # type: ignore[misc]
+class _Constants(MultiFunction):
     """Gradients of arguments replaced by tensors without a place."""
 
     expr = MultiFunction.reuse_if_untouched
 
     def __init__(self, gradients: list[Any]) -> None:
-        super().__init__()
+        super().__init__()  # type: ignore[no-untyped-call]
         self._gradients = gradients
 
     def grad(self, o: Any) -> Any:
@@ -91,7 +91,7 @@ def point_tangent(form: Any, symmetric: bool) -> PointTangent | None:
         C = _tensor(integral.integrand(), test, trial, symmetric)
     except NotLinear:
         return None
-    G, scale = ufl.JacobianInverse(mesh), abs(ufl.JacobianDeterminant(mesh))
+    G, scale = ufl.JacobianInverse(mesh), _determinant(mesh)
     inverse = [G[k, K] for k in range(3) for K in range(3)]
     geometry = _lowered(ufl.as_vector([*inverse, *(g * scale for g in inverse)]))
     values = ufl.as_vector([*C.values(), *(geometry[i] for i in range(18))])
@@ -111,6 +111,11 @@ def _tensor(integrand: Any, test: Any, trial: Any, symmetric: bool) -> dict[tupl
             if not isinstance(value, Zero) and (column <= row or not symmetric):
                 C[row, column] = value
     return C
+
+
+def _determinant(mesh: Any) -> Any:
+    determinant: Any = ufl.JacobianDeterminant(mesh)
+    return abs(determinant)
 
 
 def _lowered(integrand: Any) -> Any:

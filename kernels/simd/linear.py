@@ -27,7 +27,7 @@ class ScalarGraph:
         graph = build_scalar_graph(ufl.as_vector(expressions))
         self._values = [node["expression"] for node in graph.nodes.values()]
         self._index = graph.e2i
-        self._places: dict[int, list[int]] = {}  # of an argument's entries, by their node
+        self._flags: dict[int, list[bool]] = {}  # which nodes depend on an argument, by its number
         self.roots: list[int] = [0] * len(expressions)
         for i, node in graph.nodes.items():
             for component in node.get("component", []):
@@ -49,15 +49,15 @@ class ScalarGraph:
 
     def _dependents(self, argument: Any) -> list[bool]:
         key = argument.number()
-        if key not in self._places:
-            flags: list[Any] = []
+        if key not in self._flags:
+            flags: list[bool] = []
             for value in self._values:
                 if is_modified_terminal(value):
                     flags.append(_entry(value, argument) is not None)
                 else:
                     flags.append(any(flags[j] for j in self._operands(value)))
-            self._places[key] = flags
-        return self._places[key]
+            self._flags[key] = flags
+        return self._flags[key]
 
     def _operands(self, value: Any) -> list[int]:
         return [self._index[o] for o in value.ufl_operands if o in self._index]
@@ -99,6 +99,7 @@ def _entry(value: Any, argument: Any) -> int | None:
     """Which entry of the argument a terminal is, None where it is none."""
     if not isinstance(value, ufl.classes.Indexed):
         return None
+    whole: Any
     whole, place = value.ufl_operands
     if isinstance(whole, ufl.classes.ReferenceValue):
         (whole,) = whole.ufl_operands

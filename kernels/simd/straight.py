@@ -13,7 +13,7 @@ from typing import Any
 
 from ffcx.codegeneration import lnodes as L
 
-from .expressions import Code, Expressions
+from .expressions import Code, Expressions, value_of
 
 #: Greatest whole exponent that is written as products.
 _MOST = 8
@@ -150,4 +150,4 @@ def _number(node: Any) -> float | None:
     if isinstance(node, L.Neg):
         inner = _number(node.arg)
         return None if inner is None else -inner
-    return float(node.value) if isinstance(node, (L.LiteralFloat, L.LiteralInt)) else None
+    return value_of(node) if isinstance(node, (L.LiteralFloat, L.LiteralInt)) else None
