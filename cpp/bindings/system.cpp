@@ -177,7 +177,8 @@ void bind_system(py::module_& module) {
       .def("set_free", &System::set_free)
       .def("use_gmres", &System::use_gmres)
       .def("energy", &System::energy)
-      .def("residual", &System::residual)
+      .def("residual",
+           py::overload_cast<const supple::ConstVector&, double>(&System::residual, py::const_))
       .def("external", &System::external)
       .def("volume_ratio", &System::volume_ratio)
       .def("tangent", &tangent)

@@ -73,10 +73,15 @@ double System::energy(const ConstVector& u, double load_factor) const {
 }
 
 Vector System::residual(const ConstVector& u, double load_factor) const {
-  Vector r = Vector::Zero(dofs());
+  Vector r(dofs());
+  residual(u, load_factor, r);
+  return r;
+}
+
+void System::residual(const ConstVector& u, double load_factor, MutableVector r) const {
+  r.setZero();
   for (const auto& term : terms_)
     term->residual(u, factor_of(*term, load_factor), r);
-  return r;
 }
 
 Vector System::external(const ConstVector& u) const {
