@@ -166,6 +166,9 @@ void bind_system(py::module_& module) {
       .def_readonly("total", &supple::Timings::total)
       .def_readonly("factorisations", &supple::Timings::factorisations)
       .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
+  py::enum_<supple::Method>(module, "Method")
+      .value("direct", supple::Method::Direct)
+      .value("cg", supple::Method::Kept);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
         return std::make_unique<System>(std::make_shared<Vector>(std::move(points)),
@@ -176,6 +179,8 @@ void bind_system(py::module_& module) {
       .def("move_points", &System::move_points)
       .def("set_free", &System::set_free)
       .def("use_gmres", &System::use_gmres)
+      .def("use_method", &System::use_method)
+      .def("forget_kept", &System::forget_kept)
       .def("energy", &System::energy)
       .def("residual",
            py::overload_cast<const supple::ConstVector&, double>(&System::residual, py::const_))
@@ -183,6 +188,8 @@ void bind_system(py::module_& module) {
       .def("volume_ratio", &System::volume_ratio)
       .def("tangent", &tangent)
       .def("has_energy", &System::has_energy)
+      .def("is_minimised",
+           [](const System& s) { return s.has_energy() && s.kind() == supple::Kind::Cholesky; })
       .def("unstable_directions",
            [](System& system, const Vector& u) {
              const py::gil_scoped_release release;

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "node_rotations.hpp"
 #include "stopwatch.hpp"
 #include "supple/error.hpp"
 
@@ -15,6 +16,10 @@ double factor_of(const Term& term, double load_factor) {
 
 } // namespace
 
+System::System(std::shared_ptr<Vector> points, std::vector<Index> home)
+    : points_(std::move(points)), home_(std::move(home)) {}
+System::~System() = default;
+
 void System::add(std::shared_ptr<Term> term) {
   terms_.push_back(std::move(term));
   graph_.reset();
@@ -27,6 +32,17 @@ void System::forget_factors() {
   factor_.reset();
   indefinite_.reset();
   inverse_.reset();
+  symmetric_.reset();
+  rotations_.reset();
+}
+
+void System::use_method(Method method) {
+  if (method != method_) symmetric_.reset();
+  method_ = method;
+}
+
+void System::forget_kept() {
+  if (symmetric_) symmetric_->forget();
 }
 
 void System::use_gmres(bool gmres) {
@@ -41,6 +57,7 @@ void System::move_points(const ConstVector& points) {
   require_size("points", points.size(), static_cast<Index>(points_->size()), "three a node");
   *points_ = points;
   inverse_.reset(); // it knows the loaded shape
+  if (symmetric_) symmetric_->forget();
 }
 
 void System::set_free(Mask free) {
@@ -168,7 +185,6 @@ const Vector& System::full_tangent() {
 
 const Vector& System::reduced_tangent() {
   if (kind() != Kind::Unsymmetric) return lower_values_;
-  const Stopwatch watch(timings.assembly);
   reduced_.resize(reduction().pattern.nonzeros());
   reduction().gather(values_, reduced_);
   return reduced_;
@@ -198,7 +214,59 @@ FactorStatus System::factorise(double shift) {
   }
   current_ = factor_.get();
   ++timings.factorisations;
-  return factor_->factorise(*values);
+  const FactorStatus status = factor_->factorise(*values);
+  definite_ = status.ok() && kind() == Kind::Cholesky && shift == 0.0    ? Definite::Yes
+              : status.cause == FactorStatus::Cause::NotPositiveDefinite ? Definite::No
+                                                                         : Definite::Unknown;
+  return status;
+}
+
+FactorStatus System::prepare() {
+  if (!keeps()) return factorise();
+  if (!symmetric_) {
+    const Stopwatch watch(timings.factor);
+    symmetric_ = std::make_unique<SymmetricSolver>(reduction().pattern, rotations(),
+                                                   make_factor_preconditioner);
+  }
+  current_ = nullptr;
+  const FactorStatus status = symmetric_->prepare(lower_values_, at_);
+  count_kept();
+  return status;
+}
+
+const NodeRotations& System::rotations() {
+  if (!rotations_) rotations_ = std::make_unique<NodeRotations>(graph(), reduction(), *points_);
+  return *rotations_;
+}
+
+Vector System::along_arcs(const ConstVector& u, const ConstVector& d) {
+  return rotations().along_arcs(u, d);
+}
+
+Definite System::definite() const {
+  return current_ == nullptr && symmetric_ ? symmetric_->definite() : definite_;
+}
+
+/// By conjugate gradients; by LDLᵀ where those led to a new factor that the tangent does not have.
+void System::solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x) {
+  const FactorStatus status = symmetric_->solve(rhs, tolerance, probe, x);
+  count_kept();
+  if (status.ok()) return;
+  definite_ = symmetric_->definite();
+  if (status.cause == FactorStatus::Cause::NotPositiveDefinite && factorise_indefinite().ok()) {
+    current_->solve(rhs, x);
+  } else {
+    x.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+}
+
+void System::count_kept() {
+  SymmetricWork& work = symmetric_->work;
+  timings.factor += work.factor;
+  timings.solve += work.solve;
+  timings.factorisations += work.factorisations;
+  timings.krylov_iterations += work.iterations;
+  work = {};
 }
 
 FactorStatus System::prepare_inverse() {
@@ -229,13 +297,15 @@ FactorStatus System::factorise_indefinite() {
   return indefinite_->factorise(reduced_tangent());
 }
 
-Vector System::solve(const ConstVector& rhs, double tolerance) {
+Vector System::solve(const ConstVector& rhs, double tolerance, bool probe) {
   const Reduction& r = reduction();
   Vector x(r.free());
   if (iterates()) {
     if (!inverse_->solve(r.restrict(rhs), tolerance, x))
       x.setConstant(std::numeric_limits<double>::quiet_NaN());
     count_work();
+  } else if (current_ == nullptr) {
+    solve_kept(r.restrict(rhs), tolerance, probe, x);
   } else {
     const Stopwatch watch(timings.solve);
     Refinement refinement;

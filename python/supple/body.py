@@ -242,16 +242,17 @@ class Body:
             rtol: of max(‖external force‖, ‖reactions‖); the last step is ≤ 1e-8 of the size too.
             atol: N; rounding of the stiffness if None.
             max_iterations: of each load step.
-            solver: "auto" or "direct" (sparse factorisation).
+            solver: of the linear equations. "direct" factorises at every iteration. "cg" keeps
+                factors, over iterations, load steps and solves of this body, and iterates on them,
+                so that a result depends on what was solved before, by less than the tolerances.
+                "auto" picks one; `State.timings["solver"]` says which and why.
             progress: called with a dict after each iteration; may raise to stop.
 
         Raises:
             InputError: nothing resists a rigid motion, or a wrong argument.
             ConvergenceError: cause, history, worst cells, load factor; the body is as before.
         """
-        if solver not in ("auto", "direct"):
-            raise InputError(f'solver must be "auto" or "direct", got {solver!r}.')
-        settings = Settings(load_steps, rtol, atol, max_iterations, progress)
+        settings = Settings(load_steps, rtol, atol, max_iterations, progress, solver=solver)
         begin = None if start is None else assembly.unknowns_of(self, start)
         result, built = newton.run(self, settings, begin)
         failures.require_converged(result, built, self._description)

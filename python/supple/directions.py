@@ -156,9 +156,11 @@ def _with(rest: Rest, f: Floats) -> Rest:
 
 def _summed(rest: Rest, found: list[Rest]) -> Rest:
     """The last rest shape with the work of all."""
+    from .state import PHASES
+
     return replace(
         rest,
         iterations=sum(r.iterations for r in found),
         history=[iteration for r in found for iteration in r.history],
-        timings={name: sum(r.timings[name] for r in found) for name in rest.timings},
+        timings=rest.timings | {n: sum(float(r.timings[n]) for r in found) for n in PHASES},
     )

@@ -115,7 +115,7 @@ class Forward:
     def __init__(self, body: Body, density_of: str = "rest") -> None:
         self.target, self.size = body.mesh.points, body.mesh.size
         self.history: list[dict[str, float]] = []
-        self.timings = dict.fromkeys(PHASES, 0.0)
+        self.timings: dict[str, float] = dict.fromkeys(PHASES, 0.0)
         self.solves = 0
         self.body = body._weighed_in(density_of)
         self._scalars = np.zeros(len(terms.pressure_nodes(body._description)))  # Pa
@@ -170,7 +170,7 @@ def rest_shape(
         "u": shot.points - forward.target,
         "iterations": sum(1 for row in forward.history if row["iteration"] > 0),
         "history": forward.history,
-        "timings": forward.timings,
+        "timings": {"solver": str(shot.built.solver), **forward.timings},
     }
     solved = terms.snapshot(body._description)
     return Rest(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import assembly, supports, terms
+from . import assembly, solvers, supports, terms
 from .core import core
 from .errors import InputError
 
@@ -35,6 +35,7 @@ class Settings:
     max_iterations: int = 25
     progress: Progress | None = None
     step_tol: float = 1e-8  # of the size
+    solver: str = "auto"  # of symmetric tangents
 
     def checked(self, rounding: float, mesh: Mesh) -> Any:
         """The runtime's settings; ``rounding`` is that of the internal forces, N.
@@ -50,6 +51,7 @@ class Settings:
             raise InputError(f"max_iterations must be at least 1, got {self.max_iterations}.")
         if self.load_steps is not None and self.load_steps < 1:
             raise InputError(f"load_steps must be at least 1 or None, got {self.load_steps}.")
+        solvers.require_known(self.solver)
         native = core().NewtonSettings()
         native.rtol, native.max_iterations = self.rtol, self.max_iterations
         native.load_steps = self.load_steps or 0
@@ -92,7 +94,8 @@ def run(
     native.refuse_inversion = inverse or len(barriers) < len(laws)
     scalars = np.zeros(built.system.scalars)
     built.system.set_free(np.append(~fixed.ravel(), scalars == 0))
-    built.system.use_gmres(gmres)
+    built.solver = solvers.pick(settings.solver, built.system, int((~fixed).sum()), gmres)
+    solvers.use(built.solver, built.system)
     built.system.reset_timings()
     target = np.append(-body._prescribed if inverse else body._prescribed, scalars)
     if start is None:

@@ -46,7 +46,7 @@ class Equilibrium:
         iterations: Newton iterations over all load steps.
         history: one dict an iteration.
         timings: seconds of "assembly", "factor", "solve", "total"; how many "factorisations" and
-            "krylov_iterations" there were.
+            "krylov_iterations" there were; which "solver" was picked and why, a sentence.
         energy: potential energy, J; NaN where the loads have none.
         warnings: what to know before the result is used; empty when all is well.
         reactions: (n, 3) N, the supports' forces on the body at prescribed dofs, else 0.
@@ -57,7 +57,7 @@ class Equilibrium:
     u: Floats
     iterations: int
     history: list[dict[str, float]]
-    timings: dict[str, float]
+    timings: dict[str, float | str]
     energy: float
     reactions: Floats
     warnings: tuple[str, ...]
@@ -265,7 +265,7 @@ def outcome(
         "pressure": _pressure(result.u[fixed.size :] * built.scalar_unit, d),
         "iterations": sum(1 for i in result.history if i.iteration > 0),
         "history": [as_dict(i) for i in result.history],
-        "timings": {n: getattr(t, n) for n in PHASES},
+        "timings": {n: getattr(t, n) for n in PHASES} | {"solver": str(built.solver)},
         "energy": built.system.energy(result.u, 1.0) if has_energy else float("nan"),
         "reactions": np.where(fixed, result.residual[: fixed.size].reshape(-1, 3), 0.0),
         "warnings": _warnings(built.system.volume_ratio(result.u), result.fold),

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from .core import core
 from .laws import compiled
+from .solvers import Pick
 
 if TYPE_CHECKING:
     from .kernels.reader import Law
@@ -97,6 +98,7 @@ class Built:
     body_force: Any  # None where the nodes have masses
     forces: Any
     scalar_unit: float = 1.0  # Pa/m, see KernelTerm::set_scalar_unit
+    solver: Pick | None = None  # of its last run
 
 
 def build(

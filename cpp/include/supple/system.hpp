@@ -6,6 +6,7 @@
 
 #include "supple/inverse_solver.hpp"
 #include "supple/linear.hpp"
+#include "supple/symmetric_solver.hpp"
 #include "supple/term.hpp"
 
 namespace supple {
@@ -16,12 +17,19 @@ struct Timings {
   int factorisations = 0, krylov_iterations = 0;
 };
 
+/// How the tangents of a symmetric positive definite body are solved with.
+enum class Method {
+  Direct, ///< a factor of each
+  Kept    ///< conjugate gradients on a factor that is kept while it serves
+};
+
 class System {
  public:
   /// @param points (3n) coordinates of the mesh, m, node-major.
   /// @param home (scalars) the node whose neighbours each scalar unknown shares.
-  explicit System(std::shared_ptr<Vector> points, std::vector<Index> home = {})
-      : points_(std::move(points)), home_(std::move(home)) {}
+  explicit System(std::shared_ptr<Vector> points, std::vector<Index> home = {});
+
+  ~System();
 
   /// Add a term; the pattern is made anew at the next use.
   void add(std::shared_ptr<Term> term);
@@ -32,6 +40,10 @@ class System {
   /// Solve with unsymmetric tangents, which are those of an inverse form, by GMRES instead of LU;
   /// to be called before each run, which starts from no factor of an earlier one.
   void use_gmres(bool gmres);
+  /// Solve so where factors may be kept (`prepare`) and the kind is Cholesky; what is kept is let
+  /// go of when the method changes, or with forget_kept.
+  void use_method(Method method);
+  void forget_kept();
 
   Index scalars() const { return static_cast<Index>(home_.size()); }
   Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
@@ -72,12 +84,20 @@ class System {
   FactorStatus factorise(double shift = 0.0);
   /// The same without asking it to be positive definite (symmetric kinds only).
   FactorStatus factorise_indefinite();
+  /// Make ready to solve with the reduced tangent last assembled, if need be on the factor of an
+  /// earlier one (Method::Kept); else as factorise() does.
+  FactorStatus prepare();
   /// x (dofs), 0 at fixed ones, from the last factor; `rhs` (dofs).
-  /// @param tolerance of the residual over that of x = 0, which GMRES need not fall below.
-  /// x is not finite where GMRES and then LU found the tangent singular.
-  Vector solve(const ConstVector& rhs, double tolerance = 1e-10);
+  /// @param tolerance of the residual over that of x = 0, which an iteration need not fall below.
+  /// @param probe find out, too, whether the tangent is positive definite, where that is unknown.
+  /// x is not finite where GMRES and then LU, or LDLᵀ, found the tangent singular.
+  Vector solve(const ConstVector& rhs, double tolerance = 1e-10, bool probe = false);
+  /// What is known of the signs of the eigenvalues of the tangent last prepared or factorised.
+  Definite definite() const;
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
+  /// The step d (dofs) from `u`, its free nodes on arcs: NodeRotations::along_arcs.
+  Vector along_arcs(const ConstVector& u, const ConstVector& d);
   /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only); of a
   /// quasi-definite one those of its last factor.
   Inertia inertia();
@@ -86,8 +106,12 @@ class System {
 
  private:
   bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
+  bool keeps() const { return method_ == Method::Kept && kind() == Kind::Cholesky; }
   FactorStatus prepare_inverse();
+  const NodeRotations& rotations();
+  void solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x);
   void count_work();
+  void count_kept();
   void forget_factors();
   std::vector<Connectivity> connectivities() const;
   void assemble_full();
@@ -101,9 +125,13 @@ class System {
   std::unique_ptr<Reduction> reduction_;
   std::vector<LowerScatter> lower_; // of each term, where the kind is symmetric
   std::unique_ptr<Factor> factor_, indefinite_;
-  Factor* current_ = nullptr; // the one that factorised last
+  Factor* current_ = nullptr;             // the one that factorised last
+  Definite definite_ = Definite::Unknown; // of what current_ factorised
   std::unique_ptr<InverseSolver> inverse_;
   bool gmres_ = false;
+  std::unique_ptr<NodeRotations> rotations_; // outlives symmetric_
+  std::unique_ptr<SymmetricSolver> symmetric_;
+  Method method_ = Method::Direct;
   Vector lower_values_, values_, reduced_;
   Vector at_;                 // u of the tangent last assembled
   double load_factor_ = 0.0;  // and its loads

@@ -6,13 +6,21 @@ from pathlib import Path
 
 import click
 
+from ..choices import SYMMETRIC_SOLVERS
 from ._run import Run, command
 
 
 @command
 @click.argument("case", type=click.Path(path_type=Path))
+@click.option(
+    "--solver",
+    type=click.Choice(SYMMETRIC_SOLVERS),
+    default="auto",
+    show_default=True,
+    help="Of the linear equations; result.json says which auto took and why.",
+)
 @click.option("--allow-energy-files", is_flag=True, help="Compile energy files that CASE names.")
-def solve(run: Run, case: Path, allow_energy_files: bool) -> None:
+def solve(run: Run, case: Path, solver: str, allow_energy_files: bool) -> None:
     r"""Solve for the deformed shape of the body in CASE, a TOML file.
 
     Writes deformed.vtu and result.json to --out (default: out/ and the name of CASE). Tables of a
@@ -46,5 +54,6 @@ def solve(run: Run, case: Path, allow_energy_files: bool) -> None:
     run.progress("reading")
     body, settings = read_body(read_case(case), allow_energy_files=allow_energy_files)
     run.progress("compiling")
-    state = body.solve(progress=_report.progress(run, "solving"), **settings)
+    progress = _report.progress(run, "solving")
+    state = body.solve(solver=solver, progress=progress, **settings)
     _report.equilibrium(run, state, body.mesh, "deformed.vtu")

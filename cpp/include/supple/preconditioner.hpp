@@ -1,0 +1,34 @@
+/// What stands behind conjugate gradients: a symmetric positive definite M ≈ A, made for one matrix
+/// and used for those near it.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "supple/linear.hpp"
+
+namespace supple {
+
+class Preconditioner {
+ public:
+  virtual ~Preconditioner() = default;
+
+  /// Make M for the matrix with these values (pattern.nonzeros()) on `pattern`, storage Lower,
+  /// which is the same in all calls and outlives them. Of what was made before only the parts that
+  /// do not depend on the values may be left where the status is not ok.
+  virtual FactorStatus update(const CscPattern& pattern, const Vector& values) = 0;
+  /// z = M⁻¹ r, both (size) and not the same vector; only after an update that was ok.
+  virtual void apply(const Vector& r, Vector& z) = 0;
+  /// How many iterations an update costs: with more than so many it pays to make M anew. From
+  /// counts and not from the clock, so that the same problem is solved in the same way each time.
+  virtual int break_even() const = 0;
+  /// Bytes that one more of its kind would take, once it was made.
+  virtual double bytes() const = 0;
+};
+
+using MakePreconditioner = std::function<std::unique_ptr<Preconditioner>()>;
+
+/// M = A itself, by Cholesky.
+std::unique_ptr<Preconditioner> make_factor_preconditioner();
+
+} // namespace supple

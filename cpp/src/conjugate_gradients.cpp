@@ -1,0 +1,127 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <Eigen/Eigenvalues>
+#include <limits>
+#include <vector>
+
+#include "supple/error.hpp"
+#include "supple/krylov.hpp"
+
+namespace supple {
+namespace {
+
+constexpr double kMissed = 1e-4;   // chance that an eigenvalue below 0 goes unseen
+constexpr double kBeyond = 1.1;    // the largest eigenvalue, of the largest Ritz value
+constexpr double kNoCurve = 1e-14; // of |p||Ap|: rounding
+constexpr int kFewest = 4;         // iterations before Ritz values are looked at
+
+/// Lanczos' tridiagonal matrix of M⁻¹A, from the coefficients of conjugate gradients.
+class RitzValues {
+ public:
+  /// Of one iteration: the step alpha, and beta with which the direction before was kept.
+  void add(double alpha, double beta) {
+    diagonal_.push_back(1.0 / alpha + (diagonal_.empty() ? 0.0 : beta / last_));
+    if (diagonal_.size() > 1) beside_.push_back(std::sqrt(beta) / last_);
+    last_ = alpha;
+  }
+
+  /// Look at the values so far: what they say of a matrix of size `n`.
+  void judge(Eigen::Index n, CgReport& report) const {
+    const auto k = static_cast<Eigen::Index>(diagonal_.size());
+    if (k < kFewest) return;
+    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+    solver.computeFromTridiagonal(Eigen::Map<const Vector>(diagonal_.data(), k),
+                                  Eigen::Map<const Vector>(beside_.data(), k - 1),
+                                  Eigen::EigenvaluesOnly);
+    report.spread = solver.eigenvalues()[0] / solver.eigenvalues()[k - 1];
+    if (!(report.spread > 0.0)) {
+      report.definite = Definite::No;
+    } else if (k >= probe_iterations(report.spread, static_cast<double>(n))) {
+      report.definite = Definite::Yes;
+    }
+  }
+
+ private:
+  std::vector<double> diagonal_, beside_;
+  double last_ = 1.0;
+};
+
+/// Entries ±1 in an order without order (splitmix64), the same each time.
+Vector noise(Eigen::Index size) {
+  Vector result(size);
+  std::uint64_t state = 0;
+  for (double& entry : result) {
+    std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    entry = ((z ^ (z >> 31)) & 1u) != 0 ? 1.0 : -1.0;
+  }
+  return result;
+}
+
+} // namespace
+
+int probe_iterations(double spread, double size) {
+  if (!(spread > 0.0)) return std::numeric_limits<int>::max();
+  const double digits = std::log(1.648 * std::sqrt(size) / kMissed);
+  const double count = 0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0);
+  return static_cast<int>(std::min(count + 1.0, 1e9));
+}
+
+CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditioner,
+                             const Vector& b, Vector& x, const CgSettings& settings) {
+  require_size("x", x.size(), b.size(), "give a first guess, such as zeros");
+  CgReport report;
+  const Eigen::Index n = b.size();
+  const double scale = b.norm();
+  if (n == 0) return {true, 0, 0.0, Definite::Yes, 1.0};
+  Vector r = b, z(n), q(n);
+  if (settings.probe) {
+    const double size = (scale > 0.0 ? scale : 1.0) / std::sqrt(static_cast<double>(n));
+    preconditioner(size * noise(n), z);
+    x += z;
+    ++report.iterations;
+  }
+  if (!x.isZero(0.0)) {
+    matrix(x, q);
+    r -= q;
+  }
+  const double goal = settings.tolerance * scale;
+  double length = r.norm(), beta = 0.0, before = 0.0;
+  Vector p = Vector::Zero(n);
+  RitzValues ritz;
+  const auto finished = [&] {
+    return length <= goal && (!settings.probe || report.definite != Definite::Unknown);
+  };
+  while (!finished() && length > 0.0 && report.iterations < settings.max_iterations) {
+    preconditioner(r, z);
+    ++report.iterations;
+    const double now = r.dot(z);
+    beta = before > 0.0 ? now / before : 0.0;
+    p = z + beta * p;
+    matrix(p, q);
+    const double curvature = p.dot(q);
+    if (!(now > 0.0) || !(std::abs(curvature) > kNoCurve * p.norm() * q.norm())) break;
+    const double alpha = now / curvature;
+    x += alpha * p;
+    r -= alpha * q;
+    length = r.norm();
+    before = now;
+    if (!std::isfinite(length)) break;
+    if (curvature < 0.0) report.definite = Definite::No;
+    ritz.add(alpha, beta);
+    if (settings.probe && report.definite == Definite::Unknown) ritz.judge(n, report);
+  }
+  if (report.definite == Definite::Unknown) { // of a start that may spare an eigenvector: no proof
+    CgReport guess;
+    ritz.judge(n, guess);
+    report.spread = guess.spread;
+    if (guess.definite == Definite::No) report.definite = Definite::No;
+  }
+  report.residual = scale > 0.0 ? length / scale : 0.0;
+  report.converged = length <= goal;
+  return report;
+}
+
+} // namespace supple

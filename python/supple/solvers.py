@@ -1,0 +1,61 @@
+"""Which linear solver serves a body's symmetric tangents, and why, in one sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .choices import SYMMETRIC_SOLVERS
+from .core import core
+from .errors import InputError
+
+#: Unknowns from which a factor is worth keeping: below, making one costs no more than calls do.
+_KEEP = 2_000
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A name of `choices.SYMMETRIC_SOLVERS` or "gmres", not "auto", and the reason for it."""
+
+    name: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.why}"
+
+
+def require_known(solver: str) -> None:
+    """Refuse a name that is none of `choices.SYMMETRIC_SOLVERS`.
+
+    Raises:
+        InputError: another name.
+    """
+    if solver not in SYMMETRIC_SOLVERS:
+        names = ", ".join(f'"{name}"' for name in SYMMETRIC_SOLVERS)
+        raise InputError(f"solver must be one of {names}, got {solver!r}.")
+
+
+def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
+    """What to solve a system with.
+
+    Args:
+        asked: one of `choices.SYMMETRIC_SOLVERS`, which are for direct forms.
+        unknowns: free dofs.
+        gmres: an inverse form is to be solved so.
+    """
+    if gmres:
+        return Pick("gmres", "one symmetric factor serves many unsymmetric tangents")
+    if not system.is_minimised():
+        return Pick("direct", "only tangents that should be positive definite have another way")
+    if asked != "auto":
+        return Pick(asked, "as asked")
+    if unknowns < _KEEP:
+        return Pick("direct", f"a factor of {unknowns:,} unknowns costs less than iterations")
+    return Pick("cg", f"a factor of {unknowns:,} unknowns is worth keeping")
+
+
+def use(picked: Pick, system: Any) -> None:
+    """Solve the system's symmetric tangents so from now on."""
+    system.use_gmres(picked.name == "gmres")
+    if picked.name != "gmres":
+        system.use_method(getattr(core().Method, picked.name))
