@@ -198,6 +198,10 @@ void bind_system(py::module_& module) {
       .def("reset_timings", [](System& system) { system.timings = {}; })
       .def_readonly("timings", &System::timings)
       .def("solve", &solve);
+  module.def("connected_pieces", [](supple::Index nodes, const CellArray& cells) {
+    const std::vector<supple::Index> piece = supple::connected_pieces(nodes, connectivity(cells));
+    return py::array_t<supple::Index>(static_cast<py::ssize_t>(piece.size()), piece.data());
+  });
   module.def("set_threads", [](int threads) { omp_set_num_threads(threads); });
   module.def("threads", [] { return omp_get_max_threads(); });
 }

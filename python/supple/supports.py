@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from .core import core
 from .errors import InputError
 from .mesh_topology import by_kind
 
@@ -52,14 +53,8 @@ def require_held(mesh: Mesh, fixed: npt.NDArray[np.bool_], normals: dict[int, Fl
 
 def pieces(mesh: Mesh) -> list[Ints]:
     """Node ids of each connected piece of the mesh."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    first = np.repeat(mesh.cells[:, 0], mesh.cells.shape[1])
-    n = len(mesh.points)
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, mesh.cells.ravel())), (n, n))
-    count, label = connected_components(graph, directed=False)
-    return [np.flatnonzero(label == k) for k in range(count)]
+    label = core().connected_pieces(len(mesh.points), mesh.cells)
+    return [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
 
 
 def node_shares(mesh: Mesh, nodes: Ints) -> Floats:
