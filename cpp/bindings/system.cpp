@@ -197,7 +197,9 @@ void bind_system(py::module_& module) {
       .def("use_method", &System::use_method)
       .def("forget_kept", &System::forget_kept)
       .def("energy", &System::energy, Unlocked())
-      .def("residual", &System::residual, Unlocked())
+      .def("residual",
+           py::overload_cast<const supple::ConstVector&, double>(&System::residual, py::const_),
+           Unlocked())
       .def("external", &System::external, Unlocked())
       .def("volume_ratio", &System::volume_ratio, Unlocked())
       .def("tangent", &tangent)
@@ -211,6 +213,10 @@ void bind_system(py::module_& module) {
       .def("reset_timings", [](System& system) { system.timings = {}; })
       .def_readonly("timings", &System::timings)
       .def("solve", &solve);
+  module.def("connected_pieces", [](supple::Index nodes, const CellArray& cells) {
+    const std::vector<supple::Index> piece = supple::connected_pieces(nodes, connectivity(cells));
+    return py::array_t<supple::Index>(static_cast<py::ssize_t>(piece.size()), piece.data());
+  });
   module.def("set_threads", [](int threads) { omp_set_num_threads(threads); });
   module.def("threads", [] { return omp_get_max_threads(); });
 }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -40,7 +41,35 @@ void require_storable(std::size_t neighbours, Index node, Index nodes) {
                    "; use a coarser mesh or a lower order");
 }
 
+/// The least node of a piece stands for it; every path that is walked is halved.
+/// Source: Tarjan, van Leeuwen (1984), J. ACM 31(2).
+Index root(std::vector<Index>& parent, Index node) {
+  auto at = static_cast<std::size_t>(node);
+  while (parent[at] != static_cast<Index>(at)) {
+    parent[at] = parent[static_cast<std::size_t>(parent[at])];
+    at = static_cast<std::size_t>(parent[at]);
+  }
+  return static_cast<Index>(at);
+}
+
 } // namespace
+
+std::vector<Index> connected_pieces(Index nodes, const Connectivity& cells) {
+  check_nodes(cells, nodes);
+  std::vector<Index> parent(static_cast<std::size_t>(nodes));
+  std::iota(parent.begin(), parent.end(), 0);
+  for (Eigen::Index c = 0; c < cells.rows(); ++c)
+    for (Eigen::Index a = 1; a < cells.cols(); ++a) {
+      const Index one = root(parent, cells(c, 0)), other = root(parent, cells(c, a));
+      parent[static_cast<std::size_t>(std::max(one, other))] = std::min(one, other);
+    }
+  Index pieces = 0; // a root comes before the nodes of its piece
+  for (Index node = 0; node < nodes; ++node) {
+    const auto n = static_cast<std::size_t>(node);
+    parent[n] = parent[n] == node ? pieces++ : parent[static_cast<std::size_t>(parent[n])];
+  }
+  return parent;
+}
 
 Index NodeGraph::find(Index a, Index b) const {
   const auto node = static_cast<std::size_t>(a);

@@ -90,11 +90,16 @@ double System::energy(const ConstVector& u, double load_factor) const {
 }
 
 Vector System::residual(const ConstVector& u, double load_factor) const {
+  Vector r(dofs());
+  residual(u, load_factor, r);
+  return r;
+}
+
+void System::residual(const ConstVector& u, double load_factor, MutableVector r) const {
   const Stopwatch watch(timings.residual);
-  Vector r = Vector::Zero(dofs());
+  r.setZero();
   for (const auto& term : terms_)
     if (!term->is_silent) term->residual(u, factor_of(*term, load_factor), r);
-  return r;
 }
 
 Vector System::external(const ConstVector& u) const {
@@ -193,7 +198,6 @@ const Vector& System::full_tangent() {
 
 const Vector& System::reduced_tangent() {
   if (kind() != Kind::Unsymmetric) return lower_values_;
-  const Stopwatch watch(timings.assembly);
   reduced_.resize(reduction().pattern.nonzeros());
   reduction().gather(values_, reduced_);
   return reduced_;

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from .core import core
 from .errors import InputError
 from .mesh_topology import by_kind
 from .profile import phase
@@ -53,22 +54,9 @@ def require_held(mesh: Mesh, fixed: npt.NDArray[np.bool_], normals: dict[int, Fl
 
 
 def pieces(mesh: Mesh) -> list[Ints]:
-    """Node ids of each connected piece of the mesh.
-
-    Every node points at a lower one of its piece or at itself, its root; in each round the roots of
-    a cell's nodes are hooked to the lowest of them (Shiloach, Vishkin 1982, J. Algorithms 3).
-    """
-    root = np.arange(len(mesh.points))
-    while True:
-        roots = root[mesh.cells]
-        lowest = np.broadcast_to(roots.min(axis=1, keepdims=True), roots.shape)
-        if (roots == lowest).all():
-            break
-        np.minimum.at(root, roots.ravel(), lowest.ravel())
-        while (root[root] != root).any():
-            root = root[root]
-    order = np.argsort(root, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(root[order])) + 1)
+    """Node ids of each connected piece of the mesh."""
+    label = core().connected_pieces(len(mesh.points), mesh.cells)
+    return [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
 
 
 def node_shares(mesh: Mesh, nodes: Ints) -> Floats:

@@ -159,6 +159,21 @@ TEST(pattern_is_the_node_graph) {
                          box.pattern.column.begin() + box.pattern.row_start[r + 1]));
 }
 
+/// Boxes apart, cells in any order; a node without cells is a piece of its own.
+TEST(pieces_are_the_boxes_that_share_no_node) {
+  const Connectivity box = fixtures::box_tetrahedra(3, 2, 2);
+  const Index size = fixtures::box_nodes(3, 2, 2);
+  Connectivity cells(2 * box.rows(), 4);
+  for (Eigen::Index c = 0; c < box.rows(); ++c) {
+    cells.row(2 * c + 1) = box.row(box.rows() - 1 - c);
+    cells.row(2 * c) = box.row(c).array() + size;
+  }
+  const std::vector<Index> piece = connected_pieces(2 * size + 1, cells);
+  for (Index node = 0; node <= 2 * size; ++node)
+    CHECK(piece[static_cast<std::size_t>(node)] == node / size);
+  CHECK_THROWS(connected_pieces(size, cells), ShapeError);
+}
+
 TEST(product_equals_dense_product) {
   const Case box;
   std::mt19937 random(3);

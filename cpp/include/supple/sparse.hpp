@@ -55,6 +55,10 @@ struct NodeGraph {
 NodeGraph node_graph(Index nodes, const std::vector<Connectivity>& connectivities,
                      std::vector<Index> home = {});
 
+/// (nodes) the connected piece of each node, numbered from 0 in the order of their first nodes.
+/// @throws ShapeError if a cell names a node outside [0, nodes).
+std::vector<Index> connected_pieces(Index nodes, const Connectivity& cells);
+
 /// Node graph of a mesh and the CSR pattern of its stiffness matrix.
 struct BlockPattern : NodeGraph {
   std::vector<Index> row_start; ///< (dofs + 1) CSR offsets

@@ -64,6 +64,8 @@ class System {
   double energy(const ConstVector& u, double load_factor) const;
   /// R (dofs), N, loads scaled.
   Vector residual(const ConstVector& u, double load_factor) const;
+  /// The same into `r` (dofs), which takes no memory.
+  void residual(const ConstVector& u, double load_factor, MutableVector r) const;
   /// External force alone, −R of the loads at factor 1 (dofs), N.
   Vector external(const ConstVector& u) const;
   VolumeRatio volume_ratio(const ConstVector& u) const;
