@@ -13,6 +13,8 @@ constexpr bool kShuffles = true; ///< lanes can change places at no cost
 constexpr bool kShuffles = false;
 #endif
 
+#include "strips_solve.hpp"
+// What is built on it.
 #include "strips_body.hpp"
 
 } // namespace

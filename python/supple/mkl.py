@@ -1,4 +1,4 @@
-"""MKL's Pardiso for those who have it: `pip install "supple[mkl]"`, looked up only when asked for."""
+"""MKL's Pardiso for those who have it (`pip install "supple[mkl]"`), looked up when asked for."""
 
 from __future__ import annotations
 
