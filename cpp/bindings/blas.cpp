@@ -1,6 +1,7 @@
 #include "supple/blas.hpp"
 
 #include "core.hpp"
+#include "supple/pardiso.hpp"
 
 void bind_blas(py::module_& module) {
   using supple::BlasReport;
@@ -11,4 +12,6 @@ void bind_blas(py::module_& module) {
       .def_readonly("gflops", &BlasReport::gflops);
   module.def("blas_report", &supple::blas_report, Unlocked());
   module.def("set_blas_threads", &supple::set_blas_threads);
+  module.def("load_pardiso", &supple::load_pardiso);
+  module.def("pardiso_loaded", &supple::pardiso_loaded);
 }

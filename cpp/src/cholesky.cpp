@@ -24,6 +24,7 @@ namespace {
 using strips::Run;
 
 constexpr double kWorthThreads = 1e8; // flops of a factorisation above which a second thread pays
+constexpr double kWorthReading = 1e7; // entries of a factor that two threads read faster than one
 constexpr int kBranches = 4;          // shares for each thread
 constexpr Index kPanel = 128;         // columns that are eliminated together
 constexpr Index kColumns = 48;        // columns of a child's update that one thread adds
@@ -49,17 +50,32 @@ class Cholesky final : public Backend {
     factor_.sized(tree().panels + S * S);
     updates_.sized(tree().updates);
     failed_ = std::numeric_limits<Index>::max();
-    together([this](const Worker& worker) { factorise_shares(worker); });
+    together(flops() > kWorthThreads, [this](Worker& worker) { factorise_shares(worker); });
     if (failed_ == std::numeric_limits<Index>::max()) return {};
     return {FactorStatus::Cause::NotPositiveDefinite, tree().order[at(failed_)]};
   }
 
   void solve(const double* rhs, double* x) override {
     const double largest = scale_right_hand_side(rhs);
-    for (Index s = 0; s < tree().size(); ++s)
-      forward(s, rhs, 1.0 / largest);
-    for (Index s = tree().size() - 1; s >= 0; --s)
-      backward(s, x, scale_ * largest);
+    together(nonzeros() > kWorthReading, [&](Worker& worker) {
+      const auto branches = static_cast<int>(tree().branch.size());
+      const std::vector<Index>& trunk = tree().trunk;
+      worker.share(branches, [&](int b) {
+        for (Index s = tree().branch[at(b)].begin; s < tree().branch[at(b)].end; ++s)
+          forward(s, rhs, 1.0 / largest);
+      });
+      // By one thread: fronts to share out would cost more waiting than there is to read.
+      worker.once([&] {
+        for (const Index s : trunk)
+          forward(s, rhs, 1.0 / largest);
+        for (auto s = trunk.rbegin(); s != trunk.rend(); ++s)
+          backward(*s, x, scale_ * largest, 0);
+      });
+      worker.share(branches, [&](int b) {
+        for (Index s = tree().branch[at(b)].end; s-- > tree().branch[at(b)].begin;)
+          backward(s, x, scale_ * largest, worker.number);
+      });
+    });
   }
 
   Inertia inertia() const override {
@@ -117,33 +133,35 @@ class Cholesky final : public Backend {
     return largest > 0.0 && std::isfinite(largest) ? std::exp2(std::ilogb(largest)) : 1.0;
   }
 
-  /// Run `use` by all threads that are worth it.
+  /// Run `use` by all threads, or by this one where they are not worth their waking.
   template <class Use>
-  void together(const Use& use) {
-    const bool many = work_.size() > 1 && flops() > kWorthThreads && !omp_in_parallel();
-    if (!many) return use(Worker{});
+  void together(bool worth, const Use& use) {
+    const bool many = worth && work_.size() > 1 && !omp_in_parallel();
+    Worker alone;
+    if (!many) return use(alone);
+    team_.reset();
 #pragma omp parallel num_threads(static_cast<int>(work_.size()))
     {
-#pragma omp single
-      team_.reset(omp_get_num_threads());
-      use(Worker{omp_get_thread_num(), &team_});
+      Worker worker{omp_get_thread_num(), &team_};
+      use(worker);
     }
   }
 
-  void factorise_shares(const Worker& worker) {
+  void factorise_shares(Worker& worker) {
     worker.share(static_cast<int>(tree().branch.size()), [&](int b) {
       const Range& range = tree().branch[at(b)];
+      Worker alone{worker.number, nullptr};
       for (Index s = range.begin; s < range.end && node(s).first < failed_; ++s)
-        front(s, Worker{worker.number, nullptr});
+        front(s, alone);
     });
     for (const Index s : tree().trunk) {
-      if (node(s).first >= failed_) return; // the same for all, for all have waited
+      if (node(s).first >= failed_) return; // a thread that is late may see it sooner
       front(s, worker);
     }
   }
 
   /// Assemble and eliminate one supernode.
-  void front(Index s, const Worker& worker) {
+  void front(Index s, Worker& worker) {
     const Supernode& f = node(s);
     worker.once([&] { start_panel(s); });
     for_children(s, [&](const Supernode& child) { add(child, f, true, worker); });
@@ -167,7 +185,7 @@ class Cholesky final : public Backend {
   }
 
   /// The columns `run` of a front; false if they cannot be eliminated.
-  bool eliminate(const Supernode& f, Run run, const Worker& worker) {
+  bool eliminate(const Supernode& f, Run run, Worker& worker) {
     const Run diagonal{run.begin / S, strips::whole(run.end, S)};
     T* const to = panel(f);
     worker.once([&] {
@@ -190,7 +208,7 @@ class Cholesky final : public Backend {
   }
 
   /// Add what a child leaves to the panel of its parent's front, or to its update.
-  void add(const Supernode& child, const Supernode& f, bool to_panel, const Worker& worker) {
+  void add(const Supernode& child, const Supernode& f, bool to_panel, Worker& worker) {
     const Index* const place = places(child);
     const auto m = child.below;
     const auto inside = static_cast<Index>(std::lower_bound(place, place + m, f.columns) - place);
@@ -221,7 +239,7 @@ class Cholesky final : public Backend {
   }
 
   template <class Use>
-  void share_strips(const Worker& worker, Run strips, bool backwards, const Use& use) const {
+  void share_strips(Worker& worker, Run strips, bool backwards, const Use& use) const {
     const Index step = worker.team == nullptr ? kRows / S : kRows / 2 / S;
     const int count = std::max((strips.end - strips.begin + step - 1) / step, 0);
     worker.share(count, [&](int i) {
@@ -241,6 +259,13 @@ class Cholesky final : public Backend {
   void forward(Index s, const double* rhs, double scale) {
     const Supernode& f = node(s);
     T* const x = part(s);
+    gather_right_hand_side(s, rhs, scale);
+    kernels_.forward(panel(f), f.columns, tall(f), x, x + wide(f) * S);
+  }
+
+  void gather_right_hand_side(Index s, const double* rhs, double scale) {
+    const Supernode& f = node(s);
+    T* const x = part(s);
     T* const below = x + wide(f) * S;
     std::fill(x, below + tall(f) * S, T(0));
     for (Index j = 0; j < f.columns; ++j)
@@ -250,26 +275,30 @@ class Cholesky final : public Backend {
       const Index* const place = places(node(child));
       const T* const from = part(child) + wide(node(child)) * S;
       for (Index i = 0; i < node(child).below; ++i)
-        (place[i] < f.columns ? x : below - f.columns)[place[i]] += from[i];
+        (place[i] < f.columns ? x[place[i]] : below[place[i] - f.columns]) += from[i];
     }
-    kernels_.forward(panel(f), f.columns, tall(f), x, below);
   }
 
-  void backward(Index s, double* result, double scale) {
+  void backward(Index s, double* result, double scale, int thread) {
     const Supernode& f = node(s);
     T* const x = part(s);
-    T* const below = x + wide(f) * S;
-    if (f.parent >= 0) {
-      const Supernode& parent = node(f.parent);
-      const T* const from = part(f.parent);
-      const Index shift = wide(parent) * S - parent.columns;
-      const Index* const place = places(f);
-      for (Index i = 0; i < f.below; ++i)
-        below[i] = from[place[i] < parent.columns ? place[i] : place[i] + shift];
-    }
-    kernels_.backward(panel(f), f.columns, tall(f), x, below, work_[0].get());
+    gather_solution(s);
+    kernels_.backward(panel(f), f.columns, tall(f), x, x + wide(f) * S, work_[at(thread)].get());
     for (Index j = 0; j < f.columns; ++j)
       result[tree().order[at(f.first + j)]] = static_cast<double>(x[j]) * scale;
+  }
+
+  /// The entries of x that the rows below stand for, from the parent, which has them all.
+  void gather_solution(Index s) {
+    const Supernode& f = node(s);
+    if (f.parent < 0) return;
+    const Supernode& parent = node(f.parent);
+    const T* const from = part(f.parent);
+    T* const below = part(s) + wide(f) * S;
+    const Index shift = wide(parent) * S - parent.columns;
+    const Index* const place = places(f);
+    for (Index i = 0; i < f.below; ++i)
+      below[i] = from[place[i] < parent.columns ? place[i] : place[i] + shift];
   }
 
   const strips::Kernels<T>& kernels_ = strips::kernels<T>();

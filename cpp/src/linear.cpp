@@ -45,10 +45,15 @@ constexpr int kConjugateSteps = 3;
 
 } // namespace
 
-Factor::Factor(Kind kind, Precision precision) : state_(std::make_unique<State>()) {
+Factor::Factor(Kind kind, Precision precision, Library library)
+    : state_(std::make_unique<State>()) {
+  const bool own = library == Library::Own;
+  const bool cholesky = own && kind == Kind::Cholesky;
   state_->kind = kind;
-  state_->precision = kind == Kind::Cholesky ? precision : Precision::Double;
-  state_->backend = kind == Kind::Cholesky ? make_cholesky(precision) : make_supernodal(kind);
+  state_->precision = cholesky ? precision : Precision::Double;
+  state_->backend = !own       ? make_pardiso(kind)
+                    : cholesky ? make_cholesky(precision)
+                               : make_supernodal(kind);
 }
 Factor::Factor(Factor&&) noexcept = default;
 Factor& Factor::operator=(Factor&&) noexcept = default;

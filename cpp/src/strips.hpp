@@ -49,8 +49,7 @@ struct Kernels {
   /// strips that it meets are written too, with what they hold.
   void (*scatter)(T* to, const std::uint32_t* row, const std::uint32_t* column, const T* from,
                   Index s, Run columns, Index lanes);
-  /// x (whole strips) := L⁻¹ x with the diagonal block of k columns; below (whole strips) −=
-  /// L₂₁ x.
+  /// x (whole strips) := L⁻¹ x with the diagonal block; below (`strips`) −= L₂₁ x.
   void (*forward)(const T* panel, Index k, Index strips, T* x, T* below);
   /// x := L⁻ᵀ (x − L₂₁ᵀ below); `work` (k·lanes) is overwritten.
   void (*backward)(const T* panel, Index k, Index strips, T* x, const T* below, T* work);

@@ -2,65 +2,67 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <thread>
 
 namespace supple {
 
-/// What the threads of a team have in common.
+/// Which loop is being shared out, and how far it is. A loop is over when its parts are done, not
+/// when all threads have come by: one that is late, for the core was given to another program,
+/// passes over what is over.
 class Team {
  public:
-  /// For `size` threads; not while any of them is inside.
-  void reset(int size) {
-    size_ = size;
-    arrived_ = 0;
-    next_ = 0;
+  /// Begin anew; not while any thread is inside.
+  void reset() {
+    ticket_ = 0;
+    done_ = 0;
   }
-  int size() const { return size_; }
 
-  /// The next of the things that are shared out since the last wait.
-  int take() { return next_.fetch_add(1, std::memory_order_relaxed); }
-
-  /// Until all have arrived; what they wrote before, all can read behind.
-  void wait() {
-    const unsigned epoch = epoch_.load(std::memory_order_acquire);
-    if (arrived_.fetch_add(1, std::memory_order_acq_rel) + 1 == size_) {
-      arrived_.store(0, std::memory_order_relaxed);
-      next_.store(0, std::memory_order_relaxed);
-      epoch_.store(epoch + 1, std::memory_order_release);
-      return;
+  /// use(i) for i in [0, count) as loop number `loop`, each by one thread; all are done on return.
+  template <class Use>
+  void share(std::uint64_t loop, std::uint64_t count, const Use& use) {
+    std::uint64_t ticket = ticket_.load(std::memory_order_acquire);
+    while (ticket >> kBits == loop && (ticket & kMask) < count) {
+      if (!ticket_.compare_exchange_weak(ticket, ticket + 1, std::memory_order_acq_rel)) continue;
+      use(static_cast<int>(ticket & kMask));
+      if (done_.fetch_add(1, std::memory_order_acq_rel) + 1 == count) finish(loop);
+      ticket = ticket_.load(std::memory_order_acquire);
     }
     // Spins for some microseconds, the length of a wait; then leaves the core to whoever is late.
-    for (int turn = 0; epoch_.load(std::memory_order_acquire) == epoch; ++turn)
+    for (int turn = 0; ticket_.load(std::memory_order_acquire) >> kBits <= loop; ++turn)
       if (turn > kSpins) std::this_thread::yield();
   }
 
  private:
-  static constexpr int kSpins = 4000;
-  int size_ = 1;
-  std::atomic<int> arrived_{0}, next_{0};
-  std::atomic<unsigned> epoch_{0};
+  static constexpr int kSpins = 4000, kBits = 24;
+  static constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
+
+  void finish(std::uint64_t loop) {
+    done_.store(0, std::memory_order_relaxed);
+    ticket_.store((loop + 1) << kBits, std::memory_order_release);
+  }
+
+  std::atomic<std::uint64_t> ticket_{0}; ///< the loop, and below kBits the next of its parts
+  std::atomic<std::uint64_t> done_{0};   ///< parts of this loop
 };
 
 /// One thread of a team, or a thread alone.
 struct Worker {
   int number = 0;
   Team* team = nullptr;
+  std::uint64_t loops = 0; ///< that it has seen
 
   /// use(i) for i in [0, count), each by one thread; all are done when any returns.
   template <class Use>
-  void share(int count, const Use& use) const {
-    if (team == nullptr) {
-      for (int i = 0; i < count; ++i)
-        use(i);
-      return;
-    }
-    for (int i = team->take(); i < count; i = team->take())
+  void share(int count, const Use& use) {
+    if (team != nullptr && count > 0)
+      return team->share(loops++, static_cast<std::uint64_t>(count), use);
+    for (int i = 0; i < count; ++i)
       use(i);
-    team->wait();
   }
   /// use() by one thread; all see what it did.
   template <class Use>
-  void once(const Use& use) const {
+  void once(const Use& use) {
     share(1, [&](int) { use(); });
   }
 };

@@ -34,6 +34,12 @@ enum class Precision {
   Single ///< half the memory and time; `solve` refines by conjugate gradients in double
 };
 
+/// Whose factorisations.
+enum class Library {
+  Own,    ///< the runtime's
+  Pardiso ///< MKL's, always in double precision: see pardiso.hpp
+};
+
 /// Which part of the reduced matrix a factor of this kind reads.
 inline Storage storage(Kind kind) {
   return kind == Kind::Unsymmetric ? Storage::Full : Storage::Lower;
@@ -73,7 +79,9 @@ struct SolveReport {
 class Factor {
  public:
   /// @param precision of a factor of kind Cholesky; the others are always double.
-  explicit Factor(Kind kind, Precision precision = Precision::Double);
+  /// @throws StateError if `library` is Pardiso and was not loaded.
+  explicit Factor(Kind kind, Precision precision = Precision::Double,
+                  Library library = Library::Own);
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
   ~Factor();
