@@ -47,11 +47,10 @@ void bind_multigrid(py::module_& module) {
         pattern.lower = true;
         return std::make_unique<Bound>(Bound{
             std::move(pattern),
-            std::make_unique<supple::Multigrid>(dof, points, supple::Corners{corner_start, corner},
+            std::make_unique<supple::Multigrid>(dof, [points] { return points; }, supple::Corners{corner_start, corner},
                                                 python_aggregate(aggregate))});
       }))
       .def("update", [](Bound& b, const Vector& v) { return b.grid->update(b.pattern, v).ok(); })
-      .def("coarsen_anew", [](Bound& b, const Vector& points) { b.grid->coarsen_anew(points); })
       .def("apply",
            [](Bound& b, const Vector& r) {
              Vector z(r.size());

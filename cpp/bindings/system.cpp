@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include "aggregate.hpp"
 #include "core.hpp"
 #include "supple/kernel_term.hpp"
 #include "supple/newton.hpp"
@@ -168,7 +169,8 @@ void bind_system(py::module_& module) {
       .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
   py::enum_<supple::Method>(module, "Method")
       .value("direct", supple::Method::Direct)
-      .value("cg", supple::Method::Kept);
+      .value("cg", supple::Method::Kept)
+      .value("multigrid", supple::Method::Grid);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
         return std::make_unique<System>(std::make_shared<Vector>(std::move(points)),
@@ -181,6 +183,11 @@ void bind_system(py::module_& module) {
       .def("use_gmres", &System::use_gmres)
       .def("use_method", &System::use_method)
       .def("forget_kept", &System::forget_kept)
+      .def("use_grid",
+           [](System& system, std::vector<supple::Index> start, std::vector<supple::Index> corner,
+              const py::function& aggregate) {
+             system.use_grid({std::move(start), std::move(corner)}, python_aggregate(aggregate));
+           })
       .def("energy", &System::energy)
       .def("residual", &System::residual)
       .def("external", &System::external)

@@ -34,6 +34,11 @@ void System::use_method(Method method) {
   method_ = method;
 }
 
+void System::use_grid(Corners corners, Aggregate aggregate) {
+  corners_ = std::move(corners);
+  aggregate_ = std::move(aggregate);
+}
+
 void System::forget_kept() {
   if (symmetric_) symmetric_->forget();
 }
@@ -142,23 +147,18 @@ const Reduction& System::reduction() {
 FactorStatus System::factorise(double shift) {
   const Reduction& r = reduction();
   if (iterates()) return prepare_inverse();
+  if (has_grid()) {
+    gather(shift);
+    const FactorStatus status = symmetric().prove(reduced_, at_);
+    count_kept();
+    return status;
+  }
   const Stopwatch watch(timings.factor);
   if (!factor_) {
     factor_ = std::make_unique<Factor>(kind());
     factor_->analyse(r.pattern);
   }
-  gather();
-  if (shift > 0.0) {
-    // The lower triangle's columns begin with their diagonal entry.
-    double mean = 0.0;
-    for (std::int64_t j = 0; j < r.pattern.size; ++j) {
-      mean += std::abs(reduced_[r.pattern.start[static_cast<std::size_t>(j)]]);
-    }
-    mean /= static_cast<double>(r.pattern.size);
-    for (std::int64_t j = 0; j < r.pattern.size; ++j) {
-      reduced_[r.pattern.start[static_cast<std::size_t>(j)]] += shift * mean;
-    }
-  }
+  gather(shift);
   current_ = factor_.get();
   ++timings.factorisations;
   const FactorStatus status = factor_->factorise(reduced_);
@@ -168,23 +168,40 @@ FactorStatus System::factorise(double shift) {
   return status;
 }
 
-/// The reduced tangent's values from those last assembled.
-void System::gather() {
+/// The reduced tangent's values from those last assembled, plus `shift` times their diagonal's mean.
+void System::gather(double shift) {
   const Reduction& r = reduction();
   reduced_.resize(r.pattern.nonzeros());
   r.gather(values_, reduced_);
+  if (shift <= 0.0) return;
+  // The lower triangle's columns begin with their diagonal entry.
+  double mean = 0.0;
+  for (std::int64_t j = 0; j < r.pattern.size; ++j)
+    mean += std::abs(reduced_[r.pattern.start[static_cast<std::size_t>(j)]]);
+  mean /= static_cast<double>(r.pattern.size);
+  for (std::int64_t j = 0; j < r.pattern.size; ++j)
+    reduced_[r.pattern.start[static_cast<std::size_t>(j)]] += shift * mean;
+}
+
+/// What solves on a preconditioner, which becomes what `solve` uses.
+SymmetricSolver& System::symmetric() {
+  current_ = nullptr;
+  if (symmetric_) return *symmetric_;
+  const Stopwatch watch(timings.factor);
+  MakePreconditioner make = make_factor_preconditioner;
+  if (has_grid())
+    make = [this] {
+      const Places places = [this]() -> Vector { return *points_ + at_.head(points_->size()); };
+      return std::make_unique<Multigrid>(reduction().dof, places, corners_, aggregate_);
+    };
+  symmetric_ = std::make_unique<SymmetricSolver>(pattern(), reduction(), *points_, make);
+  return *symmetric_;
 }
 
 FactorStatus System::prepare() {
   if (!keeps()) return factorise();
-  if (!symmetric_) {
-    const Stopwatch watch(timings.factor);
-    symmetric_ = std::make_unique<SymmetricSolver>(pattern(), reduction(), *points_,
-                                                   make_factor_preconditioner);
-  }
   gather();
-  current_ = nullptr;
-  const FactorStatus status = symmetric_->prepare(reduced_, at_);
+  const FactorStatus status = symmetric().prepare(reduced_, at_);
   count_kept();
   return status;
 }
@@ -232,6 +249,7 @@ void System::count_work() {
 }
 
 FactorStatus System::factorise_indefinite() {
+  if (has_grid()) return {FactorStatus::Cause::NotPositiveDefinite, -1}; // it has no such factor
   const Reduction& r = reduction();
   const Stopwatch watch(timings.factor);
   if (!indefinite_) {
@@ -271,6 +289,7 @@ Vector System::apply(const ConstVector& x) {
 }
 
 Inertia System::inertia() {
+  if (has_grid()) return {factorise().ok() ? 0 : 1, 0, 0, 0.0}; // as far as it can tell
   if (kind() == Kind::QuasiDefinite && factor_) return factor_->inertia();
   if (!factorise_indefinite().ok()) return {0, 1, 0, 0.0};
   return indefinite_->inertia();

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from . import multigrid
 from .choices import SYMMETRIC_SOLVERS
 from .core import core
 from .errors import InputError
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
 
 #: Unknowns from which a factor is worth keeping: below, making one costs no more than calls do.
 _KEEP = 2_000
@@ -45,6 +49,14 @@ def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
     """
     if gmres:
         return Pick("gmres", "one symmetric factor serves many unsymmetric tangents")
+    if asked == "multigrid":
+        multigrid.require_available()
+        if not system.is_minimised():
+            raise InputError(
+                'solver "multigrid" wants a body whose tangents are symmetric positive definite: no '
+                "pressure that follows, no mixed formulation, no inverse form; "
+                'choose solver "direct".'
+            )
     if not system.is_minimised():
         return Pick("direct", "only tangents that should be positive definite have another way")
     if asked != "auto":
@@ -54,8 +66,10 @@ def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
     return Pick("cg", f"a factor of {unknowns:,} unknowns is worth keeping")
 
 
-def use(picked: Pick, system: Any) -> None:
+def use(picked: Pick, system: Any, mesh: Mesh) -> None:
     """Solve the system's symmetric tangents so from now on."""
     system.use_gmres(picked.name == "gmres")
+    if picked.name == "multigrid":
+        system.use_grid(*multigrid.corners(mesh), multigrid.aggregate)
     if picked.name != "gmres":
         system.use_method(getattr(core().Method, picked.name))

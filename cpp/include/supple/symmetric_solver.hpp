@@ -45,6 +45,10 @@ class SymmetricSolver {
   /// @param probe find out, too, whether K is positive definite: see definite().
   FactorStatus solve(const Vector& rhs, double tolerance, bool probe, Vector& x);
 
+  /// Take the values as `prepare` does, make a preconditioner of them in any case, and find out
+  /// whether they are positive definite; NotPositiveDefinite where they are not.
+  FactorStatus prove(const Vector& values, const ConstVector& u);
+
   /// What is known of the matrix at hand.
   Definite definite() const { return definite_; }
 
@@ -55,6 +59,9 @@ class SymmetricSolver {
 
  private:
   FactorStatus renew();
+  void take(const Vector& values, const ConstVector& u);
+  int excess(const CgReport& report) const;
+  void rate(const CgReport& report);
   CgReport iterate(const Vector& rhs, double tolerance, bool probe, Vector& x);
 
   const Reduction& reduction_;
@@ -65,6 +72,9 @@ class SymmetricSolver {
   std::vector<Eigen::Matrix3d> turned_, turn_; // rotations where it was made, and now
   bool usable_ = false;                        // it was made, and that was ok
   bool fresh_ = false;                         // of the matrix at hand
+  double rate_ = 0.0;                          // digits an iteration, when it was fresh
+  double best_rate_ = 0.0;                     // and when it had been made from nothing
+  bool anew_ = true;                           // it is to be made from nothing
   bool worn_ = false;                          // a new one would have cost less
   Definite definite_ = Definite::Unknown;
   const Vector* values_ = nullptr;

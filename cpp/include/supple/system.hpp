@@ -6,6 +6,7 @@
 
 #include "supple/inverse_solver.hpp"
 #include "supple/linear.hpp"
+#include "supple/multigrid.hpp"
 #include "supple/symmetric_solver.hpp"
 #include "supple/term.hpp"
 
@@ -20,7 +21,8 @@ struct Timings {
 /// How the tangents of a symmetric positive definite body are solved with.
 enum class Method {
   Direct, ///< a factor of each
-  Kept    ///< conjugate gradients on a factor that is kept while it serves
+  Kept,   ///< conjugate gradients on a factor that is kept while it serves
+  Grid    ///< conjugate gradients on multigrid; the whole matrix is never factorised
 };
 
 class System {
@@ -43,6 +45,8 @@ class System {
   /// go of when the method changes, or with forget_kept.
   void use_method(Method method);
   void forget_kept();
+  /// What Method::Grid makes its levels of: see Multigrid.
+  void use_grid(Corners corners, Aggregate aggregate);
 
   Index scalars() const { return static_cast<Index>(home_.size()); }
   Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
@@ -88,15 +92,18 @@ class System {
   Vector apply(const ConstVector& x);
   /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only); of a
   /// quasi-definite one those of its last factor.
+  /// With Method::Grid only whether one is negative: 1, or 0.
   Inertia inertia();
 
   Timings timings;
 
  private:
   bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
-  bool keeps() const { return method_ == Method::Kept && kind() == Kind::Cholesky; }
+  bool keeps() const { return method_ != Method::Direct && kind() == Kind::Cholesky; }
+  bool has_grid() const { return method_ == Method::Grid && kind() == Kind::Cholesky; }
   FactorStatus prepare_inverse();
-  void gather();
+  void gather(double shift = 0.0);
+  SymmetricSolver& symmetric();
   void solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x);
   void count_work();
   void count_kept();
@@ -115,6 +122,8 @@ class System {
   bool gmres_ = false;
   std::unique_ptr<SymmetricSolver> symmetric_;
   Method method_ = Method::Direct;
+  Corners corners_;
+  Aggregate aggregate_;
   Vector values_, reduced_;
   Vector at_; // u of values_
 };
