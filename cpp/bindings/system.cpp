@@ -182,6 +182,7 @@ void bind_system(py::module_& module) {
       .def("set_free", &System::set_free)
       .def("use_gmres", &System::use_gmres)
       .def("use_method", &System::use_method)
+      .def("predicted_factor", &System::predicted_factor)
       .def("forget_kept", &System::forget_kept)
       .def("use_grid",
            [](System& system, std::vector<supple::Index> start, std::vector<supple::Index> corner,

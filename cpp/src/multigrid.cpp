@@ -97,8 +97,7 @@ struct Multigrid::State {
   Vector in, out;       // of multiply
 };
 
-Multigrid::Multigrid(std::vector<Index> dof, Places places, Corners corners,
-                     Aggregate aggregate)
+Multigrid::Multigrid(std::vector<Index> dof, Places places, Corners corners, Aggregate aggregate)
     : state_(std::make_unique<State>(std::move(dof), std::move(places), std::move(corners),
                                      std::move(aggregate))) {}
 
@@ -259,6 +258,10 @@ double Multigrid::bytes() const {
   for (const Level& level : state_->levels)
     bytes += 4.0 * static_cast<double>(level.A.value.size() + 2 * level.P.value.size());
   return bytes;
+}
+
+const BlockMatrix<float>& Multigrid::prolongation(std::size_t level) const {
+  return state_->levels.at(level).P;
 }
 
 std::vector<Index> Multigrid::rows() const {

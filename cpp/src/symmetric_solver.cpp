@@ -10,8 +10,8 @@
 namespace supple {
 namespace {
 
-constexpr int kFewest = 30; // iterations that are always granted
-constexpr int kMost = 300;  // to a preconditioner that is not exact
+constexpr int kFewest = 30;    // iterations that are always granted
+constexpr int kMost = 300;     // to a preconditioner that is not exact
 constexpr double kFaded = 0.5; // of the rate at first, where a preconditioner is begun from nothing
 
 double digits(const CgReport& report) {

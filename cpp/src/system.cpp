@@ -144,6 +144,15 @@ const Reduction& System::reduction() {
   return *reduction_;
 }
 
+std::pair<double, double> System::predicted_factor() {
+  const Stopwatch watch(timings.factor);
+  if (!factor_) {
+    factor_ = std::make_unique<Factor>(kind());
+    factor_->analyse(reduction().pattern);
+  }
+  return {factor_->flops(), factor_->nonzeros()};
+}
+
 FactorStatus System::factorise(double shift) {
   const Reduction& r = reduction();
   if (iterates()) return prepare_inverse();
@@ -168,7 +177,8 @@ FactorStatus System::factorise(double shift) {
   return status;
 }
 
-/// The reduced tangent's values from those last assembled, plus `shift` times their diagonal's mean.
+/// The reduced tangent's values from those last assembled, plus `shift` times their diagonal's
+/// mean.
 void System::gather(double shift) {
   const Reduction& r = reduction();
   reduced_.resize(r.pattern.nonzeros());

@@ -68,6 +68,8 @@ class Multigrid final : public Preconditioner {
   int break_even() const override;
   double bytes() const override;
 
+  /// From level `level` + 1 to `level`, the finest being 0.
+  const BlockMatrix<float>& prolongation(std::size_t level) const;
   /// Block rows of each level, the finest first.
   std::vector<Index> rows() const;
   /// Entries of all levels' matrices over those of the finest.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "supple/inverse_solver.hpp"
@@ -78,6 +79,9 @@ class System {
   FactorStatus factorise(double shift = 0.0);
   /// The same without asking it to be positive definite (symmetric kinds only).
   FactorStatus factorise_indefinite();
+  /// Flops and entries of a Cholesky factor of the reduced tangent, as its analysis counts them;
+  /// the analysis is kept.
+  std::pair<double, double> predicted_factor();
   /// Make ready to solve with the reduced tangent last assembled, if need be on the factor of an
   /// earlier one (Method::Kept); else as factorise() does.
   FactorStatus prepare();
