@@ -48,6 +48,8 @@ class System {
   void forget_kept();
   /// What Method::Grid makes its levels of: see Multigrid.
   void use_grid(Corners corners, Aggregate aggregate);
+  /// Whether tangents are solved with by multigrid, which knows no inertia of indefinite ones.
+  bool has_grid() const { return method_ == Method::Grid && kind() == Kind::Cholesky; }
 
   Index scalars() const { return static_cast<Index>(home_.size()); }
   Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
@@ -104,7 +106,6 @@ class System {
  private:
   bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
   bool keeps() const { return method_ != Method::Direct && kind() == Kind::Cholesky; }
-  bool has_grid() const { return method_ == Method::Grid && kind() == Kind::Cholesky; }
   FactorStatus prepare_inverse();
   void gather(double shift = 0.0);
   SymmetricSolver& symmetric();
