@@ -26,20 +26,20 @@ class RitzValues {
     last_ = alpha;
   }
 
-  /// Whether the values so far show that no eigenvalue of a matrix of size `n` is below 0.
-  Definite verdict(Eigen::Index n) const {
+  /// Look at the values so far: what they say of a matrix of size `n`.
+  void judge(Eigen::Index n, CgReport& report) const {
     const auto k = static_cast<Eigen::Index>(diagonal_.size());
-    if (k < kFewest) return Definite::Unknown;
+    if (k < kFewest) return;
     Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
     solver.computeFromTridiagonal(Eigen::Map<const Vector>(diagonal_.data(), k),
                                   Eigen::Map<const Vector>(beside_.data(), k - 1),
                                   Eigen::EigenvaluesOnly);
-    const double smallest = solver.eigenvalues()[0], largest = solver.eigenvalues()[k - 1];
-    if (!(smallest > 0.0)) return Definite::No;
-    const double exponent =
-        std::sqrt(smallest / (kBeyond * largest)) * (2.0 * static_cast<double>(k) - 1.0);
-    const double chance = 1.648 * std::sqrt(static_cast<double>(n)) * std::exp(-exponent);
-    return chance <= kMissed ? Definite::Yes : Definite::Unknown;
+    report.spread = solver.eigenvalues()[0] / solver.eigenvalues()[k - 1];
+    if (!(report.spread > 0.0)) {
+      report.definite = Definite::No;
+    } else if (k >= probe_iterations(report.spread, static_cast<double>(n))) {
+      report.definite = Definite::Yes;
+    }
   }
 
  private:
@@ -62,13 +62,20 @@ Vector noise(Eigen::Index size) {
 
 } // namespace
 
+int probe_iterations(double spread, double size) {
+  if (!(spread > 0.0)) return std::numeric_limits<int>::max();
+  const double digits = std::log(1.648 * std::sqrt(size) / kMissed);
+  const double count = 0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0);
+  return static_cast<int>(std::min(count + 1.0, 1e9));
+}
+
 CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditioner,
                              const Vector& b, Vector& x, const CgSettings& settings) {
   require_size("x", x.size(), b.size(), "give a first guess, such as zeros");
   CgReport report;
   const Eigen::Index n = b.size();
   const double scale = b.norm();
-  if (n == 0) return {true, 0, 0.0, Definite::Yes};
+  if (n == 0) return {true, 0, 0.0, Definite::Yes, 1.0};
   Vector r = b, z(n), q(n);
   if (settings.probe) {
     const double size = (scale > 0.0 ? scale : 1.0) / std::sqrt(static_cast<double>(n));
@@ -104,7 +111,13 @@ CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditio
     if (!std::isfinite(length)) break;
     if (curvature < 0.0) report.definite = Definite::No;
     ritz.add(alpha, beta);
-    if (settings.probe && report.definite == Definite::Unknown) report.definite = ritz.verdict(n);
+    if (settings.probe && report.definite == Definite::Unknown) ritz.judge(n, report);
+  }
+  if (report.definite == Definite::Unknown) { // of a start that may spare an eigenvector: no proof
+    CgReport guess;
+    ritz.judge(n, guess);
+    report.spread = guess.spread;
+    if (guess.definite == Definite::No) report.definite = Definite::No;
   }
   report.residual = scale > 0.0 ? length / scale : 0.0;
   report.converged = length <= goal;

@@ -128,8 +128,8 @@ GmresReport gmres(const Operator& matrix, const Operator& preconditioner, const 
 double Forcing::next(double norm, double tolerance) {
   double eta = loosest_;
   if (before_ > 0.0) {
-    eta = 0.9 * std::pow(norm / before_, 2);
-    const double memory = 0.9 * last_ * last_;
+    eta = 0.9 * std::pow(norm / before_, alpha_);
+    const double memory = 0.9 * std::pow(last_, alpha_);
     if (memory > 0.1) eta = std::max(eta, memory);
     eta = std::min(eta, loosest_);
   }

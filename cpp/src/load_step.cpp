@@ -16,8 +16,11 @@ constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
 constexpr double kSettled = 1e-2; // accuracy of the step that shows that no more are needed
 constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
-constexpr double kCreeping = 1.0 / 32.0; // of a step, below which there are better ways on
-constexpr int kHopeless = 3; // full steps in a row after which the residual must have halved
+constexpr double kCreeping = 1.0 / 32.0;       // of a step, below which there are better ways on
+constexpr double kSure = 0.1;                  // of the tolerance, that a chord's step is to reach
+constexpr double kLoosest = 0.1, kAlpha = 1.5; // of the forcing, where solves are iterated
+constexpr double kBent = 0.02; // of a step, by which arcs must differ to be looked at
+constexpr int kHopeless = 3;   // full steps in a row after which the residual must have halved
 
 /// Full steps that no longer gain: a quick no, for there are better ways than to wait.
 class Gain {
@@ -43,13 +46,14 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
   Vector r = p_.residual(u, s);
   double norm = p_.free_norm(r), tol = p_.tolerance(u, r, s);
   p_.record({s, 0, norm, tol, 0.0, 1.0, shift_});
-  Forcing forcing;
+  Forcing forcing = p_.minimises ? Forcing(kLoosest, kAlpha) : Forcing();
+  bool chord = false;
   // Steps that lower an energy cannot run away: cutting the load instead would lose their ground.
   const bool descends = manner == Manner::Guarded && p_.minimises;
   const int limit = (descends ? kPatience : 1) * p_.settings.max_iterations;
   Gain gain;
   for (int k = 1; k <= limit; ++k) {
-    const Outcome factored = factorise(u, s, manner);
+    const Outcome factored = chord ? Outcome::Converged : factorise(u, s, manner);
     if (factored != Outcome::Converged) return factored;
     Vector d = p_.missing(u, s);
     const bool moves_supports = d.cwiseAbs().maxCoeff() > 0.0;
@@ -60,9 +64,11 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     d += p_.system.solve(rhs, exact, p_.minimises && exact * norm <= tol);
     if (!d.allFinite()) return Outcome::Singular;
     if (first_.size() == 0) first_ = d;
+    if (manner == Manner::Full) bend(u, d, s);
     const double length = line_search(u, d, r, norm, s, manner, moves_supports);
     if (length == 0.0) return fault();
     u += length * d;
+    const double before = norm;
     r = p_.residual(u, s);
     norm = p_.free_norm(r);
     p_.result.last_residual = r;
@@ -76,10 +82,22 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     if (norm <= tol && shift_ > 0.0 && step <= p_.settings.step_tol * p_.settings.size) {
       return stable(u);
     }
+    // A step with the tangent at hand shrinks R as this one did: if that is enough, it may stay.
+    chord = !chord && manner == Manner::Full && p_.has_energy && !p_.settings.kinks &&
+            norm / before * norm <= kSure * tol;
     if (!descends && length < kCreeping) break;
     if (manner == Manner::Full && norm > tol && gain.lost(norm)) break;
   }
   return fault();
+}
+
+/// Lay the step on arcs where that leaves less force: what turns is then not stretched.
+void LoadStep::bend(const Vector& u, Vector& d, double s) {
+  if (!p_.has_energy) return;
+  const Vector arcs = p_.system.along_arcs(u, d);
+  if (!((arcs - d).cwiseAbs().maxCoeff() > kBent * d.cwiseAbs().maxCoeff())) return;
+  const double straight = p_.free_norm(p_.residual(u + d, s));
+  if (!(p_.free_norm(p_.residual(u + arcs, s)) >= straight)) d = arcs;
 }
 
 /// Factorise K at `u`; an indefinite K is shifted in the guarded manner until it is not.

@@ -22,6 +22,7 @@ class LoadStep {
   Outcome factorise(const Vector& u, double s, Manner manner);
   double line_search(const Vector& u, const Vector& d, const Vector& r, double norm, double s,
                      Manner manner, bool moves_supports);
+  void bend(const Vector& u, Vector& d, double s);
   bool settled(Vector& u, Vector& r, double norm, double step, double s);
   Outcome stable(const Vector& u);
   Outcome fault() const;

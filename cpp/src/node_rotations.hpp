@@ -20,14 +20,26 @@ class NodeRotations {
 
   /// Rotations from rest to `u` (dofs).
   Rotations at(const ConstVector& u) const;
-  /// y = Q x, Q = `to` `from`ᵀ of each node; or Qᵀ x. (unknowns), y may be x.
-  void turn(const Rotations& from, const Rotations& to, const Vector& x, Vector& y) const;
+  /// x := Q x, block by block (unknowns).
+  void turn(const Rotations& q, Vector& x) const;
+  /// y = Qᵀ x, both (unknowns) and not the same.
+  void turn_back(const Rotations& q, const Vector& x, Vector& y) const;
+
+  /// The way d (dofs) from `u` with the turn that it makes: each node goes on along an arc, its
+  /// velocity turning with the curl of d there, instead of straight on, which stretches what turns.
+  /// For a short way it differs from d by its square.
+  /// Source: Choi and Ko (2005), IEEE TVCG 11(1), eq. 22.
+  Vector along_arcs(const ConstVector& u, const ConstVector& d) const;
 
  private:
   struct Node {
     Index node, unknown; ///< its first of three
   };
-  Eigen::Matrix3d moments(Index node, const ConstVector& u) const;
+  struct Moments {
+    Eigen::Matrix3d mixed, own; ///< Σ b aᵀ and Σ a aᵀ of the neighbours' places about their means
+  };
+  template <class PlaceA, class PlaceB>
+  Moments moments(Index node, PlaceA a, PlaceB b) const;
 
   const BlockPattern* pattern_;
   const Vector* points_;

@@ -20,11 +20,10 @@ double digits(const CgReport& report) {
 
 } // namespace
 
-SymmetricSolver::SymmetricSolver(const BlockPattern& pattern, const Reduction& reduction,
-                                 const Vector& points, MakePreconditioner make)
-    : reduction_(reduction),
-      rotations_(std::make_unique<NodeRotations>(pattern, reduction, points)),
-      product_(std::make_unique<SymmetricProduct>(reduction.pattern)), make_(std::move(make)) {}
+SymmetricSolver::SymmetricSolver(const CscPattern& pattern, const NodeRotations& rotations,
+                                 MakePreconditioner make)
+    : pattern_(pattern), rotations_(rotations),
+      product_(std::make_unique<SymmetricProduct>(pattern)), make_(std::move(make)) {}
 
 SymmetricSolver::~SymmetricSolver() = default;
 
@@ -34,15 +33,16 @@ void SymmetricSolver::forget() {
 
 void SymmetricSolver::take(const Vector& values, const ConstVector& u) {
   values_ = &values;
-  turn_ = rotations_->at(u);
+  turn_ = rotations_.at(u);
   fresh_ = false;
+  if (usable_) set_turn();
   definite_ = Definite::Unknown;
 }
 
 FactorStatus SymmetricSolver::prepare(const Vector& values, const ConstVector& u) {
   take(values, u);
   if (!usable_ || worn_) return renew();
-  kept_->take(reduction_.pattern, values);
+  kept_->take(pattern_, values);
   return {};
 }
 
@@ -50,7 +50,7 @@ FactorStatus SymmetricSolver::prove(const Vector& values, const ConstVector& u) 
   take(values, u);
   const FactorStatus status = renew();
   if (!status.ok() || definite_ != Definite::Unknown) return status;
-  Vector x = Vector::Zero(reduction_.free());
+  Vector x = Vector::Zero(pattern_.size);
   iterate(Vector::Ones(x.size()), 1.0, true, x);
   if (definite_ == Definite::No) return {FactorStatus::Cause::NotPositiveDefinite, -1};
   return status;
@@ -61,11 +61,12 @@ FactorStatus SymmetricSolver::renew() {
   if (!kept_) kept_ = make_();
   anew_ = rate_ < kFaded * best_rate_ || !usable_;
   if (anew_) kept_->start_over();
-  const FactorStatus status = kept_->update(reduction_.pattern, *values_);
+  const FactorStatus status = kept_->update(pattern_, *values_);
   ++work.factorisations;
   usable_ = fresh_ = status.ok();
   worn_ = false;
   turned_ = turn_;
+  spread_ = 1.0;
   if (status.ok() && kept_->exact()) definite_ = Definite::Yes;
   if (status.cause == FactorStatus::Cause::NotPositiveDefinite) definite_ = Definite::No;
   return status;
@@ -79,9 +80,9 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   };
   const auto preconditioner = [&](const Vector& in, Vector& out) {
     if (fresh_) return kept_->apply(in, out);
-    rotations_->turn(turn_, turned_, in, turned);
+    rotations_.turn_back(since_, in, turned);
     kept_->apply(turned, out);
-    rotations_->turn(turned_, turn_, out, out);
+    rotations_.turn(since_, out);
   };
   const int saved = kept_->break_even();
   const bool unsure = probe && definite_ == Definite::Unknown;
@@ -89,6 +90,7 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   const CgReport report =
       conjugate_gradients(matrix, preconditioner, rhs, x, {tolerance, limit, unsure});
   work.iterations += report.iterations;
+  if (report.spread != 0.0) spread_ = report.spread;
   if (fresh_) rate(report);
   worn_ = !fresh_ && excess(report) > saved;
   if (report.definite != Definite::Unknown && definite_ == Definite::Unknown)
@@ -98,7 +100,7 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
 
 /// Iterations more than a fresh preconditioner would have needed.
 int SymmetricSolver::excess(const CgReport& report) const {
-  if (kept_->exact()) return report.iterations;
+  if (kept_->exact() || !(rate_ > 0.0)) return report.iterations;
   return report.iterations - static_cast<int>(std::ceil(digits(report) / rate_));
 }
 
@@ -108,9 +110,25 @@ void SymmetricSolver::rate(const CgReport& report) {
   if (anew_) best_rate_ = rate_;
 }
 
+/// Q of each node, from where the factor was made to where the matrix is.
+void SymmetricSolver::set_turn() {
+  since_.resize(turn_.size());
+  for (std::size_t k = 0; k < turn_.size(); ++k)
+    since_[k] = turn_[k] * turned_[k].transpose();
+}
+
+bool SymmetricSolver::cheap_to_probe(double size) const {
+  if (!kept_->exact()) return true; // a new one would not tell
+  return probe_iterations(spread_, size) <= kept_->break_even();
+}
+
 FactorStatus SymmetricSolver::solve(const Vector& rhs, double tolerance, bool probe, Vector& x) {
   x.setZero(rhs.size());
   if (!usable_) return {FactorStatus::Cause::Singular, -1};
+  if (probe && definite_ == Definite::Unknown && !cheap_to_probe(static_cast<double>(rhs.size()))) {
+    const FactorStatus status = renew(); // which tells, too, and serves the next solves
+    if (!status.ok()) return status;
+  }
   bool good = iterate(rhs, tolerance, probe, x).converged;
   if (!good && !fresh_) {
     const FactorStatus status = renew();

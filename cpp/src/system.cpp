@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "node_rotations.hpp"
 #include "stopwatch.hpp"
 #include "supple/error.hpp"
 
@@ -15,6 +16,10 @@ double factor_of(const Term& term, double load_factor) {
 
 } // namespace
 
+System::System(std::shared_ptr<Vector> points, std::vector<Index> home)
+    : points_(std::move(points)), home_(std::move(home)) {}
+System::~System() = default;
+
 void System::add(std::shared_ptr<Term> term) {
   terms_.push_back(std::move(term));
   pattern_.reset();
@@ -27,6 +32,7 @@ void System::forget_factors() {
   indefinite_.reset();
   inverse_.reset();
   symmetric_.reset();
+  rotations_.reset();
 }
 
 void System::use_method(Method method) {
@@ -204,7 +210,7 @@ SymmetricSolver& System::symmetric() {
       const Places places = [this]() -> Vector { return *points_ + at_.head(points_->size()); };
       return std::make_unique<Multigrid>(reduction().dof, places, corners_, aggregate_);
     };
-  symmetric_ = std::make_unique<SymmetricSolver>(pattern(), reduction(), *points_, make);
+  symmetric_ = std::make_unique<SymmetricSolver>(reduction().pattern, rotations(), make);
   return *symmetric_;
 }
 
@@ -214,6 +220,15 @@ FactorStatus System::prepare() {
   const FactorStatus status = symmetric().prepare(reduced_, at_);
   count_kept();
   return status;
+}
+
+const NodeRotations& System::rotations() {
+  if (!rotations_) rotations_ = std::make_unique<NodeRotations>(pattern(), reduction(), *points_);
+  return *rotations_;
+}
+
+Vector System::along_arcs(const ConstVector& u, const ConstVector& d) {
+  return rotations().along_arcs(u, d);
 }
 
 Definite System::definite() const {

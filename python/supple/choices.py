@@ -1,4 +1,4 @@
-"""Names of what `Body.solve` and `Body.rest_shape` offer; imports nothing, so that commands list them at once."""
+"""Names that `Body.solve` and `Body.rest_shape` offer; imports nothing, for commands to list."""
 
 #: Fixed points of forward solves.
 FIXED_POINTS = ("sellier", "sellier-aitken", "sellier-anderson")

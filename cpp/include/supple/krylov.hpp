@@ -49,7 +49,11 @@ struct CgReport {
   int iterations = 0;    ///< applications of the preconditioner
   double residual = 0.0; ///< ‖b − Ax‖₂ / ‖b‖₂ as the recurrence has it
   Definite definite = Definite::Unknown;
+  double spread = 0.0; ///< smallest over largest Ritz value of M⁻¹A, 0 where too few are known
 };
+
+/// Iterations of a probe after which A is known to be definite, if these are its extreme values.
+int probe_iterations(double spread, double size);
 
 /// Solve A x = b by conjugate gradients preconditioned with M; x is the last iterate also where it
 /// has not converged.
@@ -67,17 +71,17 @@ CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditio
 
 /// How exactly Newton's equation is to be solved, so that no more is spent than the step is worth.
 ///
-/// η = 0.9 (‖R‖/‖R before‖)², at least 0.9 η before² where that is above 0.1, at most `loosest`,
-/// and no less than half of what is left to do, tolerance/‖R‖.
-/// Source: Eisenstat, Walker (1996), SIAM J. Sci. Comput. 17(1), choice 2 with γ = 0.9, α = 2.
+/// η = 0.9 (‖R‖/‖R before‖)^α, at least 0.9 (η before)^α where that is above 0.1, at most
+/// `loosest`, and no less than half of what is left to do, tolerance/‖R‖.
+/// Source: Eisenstat, Walker (1996), SIAM J. Sci. Comput. 17(1), choice 2 with γ = 0.9.
 class Forcing {
  public:
-  explicit Forcing(double loosest = 0.03) : loosest_(loosest) {}
+  explicit Forcing(double loosest = 0.03, double alpha = 2.0) : loosest_(loosest), alpha_(alpha) {}
   /// For the step from a residual of size `norm` that shall fall to `tolerance`.
   double next(double norm, double tolerance);
 
  private:
-  double loosest_, before_ = -1.0, last_ = 0.0;
+  double loosest_, alpha_, before_ = -1.0, last_ = 0.0;
 };
 
 } // namespace supple

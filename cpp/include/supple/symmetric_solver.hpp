@@ -30,10 +30,9 @@ struct SymmetricWork {
 
 class SymmetricSolver {
  public:
-  /// @param pattern of the mesh; `reduction`, of storage Lower; `points` (3n) at rest, m. All
-  /// outlive the solver.
+  /// @param pattern of the reduced tangents, storage Lower; it and `rotations` outlive the solver.
   /// @param make the kind of preconditioner, one of which is made here for each that is kept.
-  SymmetricSolver(const BlockPattern& pattern, const Reduction& reduction, const Vector& points,
+  SymmetricSolver(const CscPattern& pattern, const NodeRotations& rotations,
                   MakePreconditioner make);
   ~SymmetricSolver();
 
@@ -62,20 +61,23 @@ class SymmetricSolver {
   void take(const Vector& values, const ConstVector& u);
   int excess(const CgReport& report) const;
   void rate(const CgReport& report);
+  void set_turn();
+  bool cheap_to_probe(double size) const;
   CgReport iterate(const Vector& rhs, double tolerance, bool probe, Vector& x);
 
-  const Reduction& reduction_;
-  std::unique_ptr<NodeRotations> rotations_;
+  const CscPattern& pattern_;
+  const NodeRotations& rotations_;
   std::unique_ptr<SymmetricProduct> product_;
   MakePreconditioner make_;
   std::unique_ptr<Preconditioner> kept_;
-  std::vector<Eigen::Matrix3d> turned_, turn_; // rotations where it was made, and now
-  bool usable_ = false;                        // it was made, and that was ok
-  bool fresh_ = false;                         // of the matrix at hand
-  double rate_ = 0.0;                          // digits an iteration, when it was fresh
-  double best_rate_ = 0.0;                     // and when it had been made from nothing
-  bool anew_ = true;                           // it is to be made from nothing
-  bool worn_ = false;                          // a new one would have cost less
+  std::vector<Eigen::Matrix3d> turned_, turn_, since_; // rotations where it was made, now, between
+  bool usable_ = false;                                // it was made, and that was ok
+  bool fresh_ = false;                                 // of the matrix at hand
+  bool worn_ = false;                                  // a new one would have cost less
+  bool anew_ = true;                                   // it was made from nothing
+  double rate_ = 0.0;                                  // digits an iteration, when it was fresh
+  double best_rate_ = 0.0;                             // and when it had been made from nothing
+  double spread_ = 0.0; // of the last matrix solved with, seen through what is kept
   Definite definite_ = Definite::Unknown;
   const Vector* values_ = nullptr;
 };

@@ -30,8 +30,9 @@ class System {
  public:
   /// @param points (3n) coordinates of the mesh, m, node-major.
   /// @param home (scalars) the node whose neighbours each scalar unknown shares.
-  explicit System(std::shared_ptr<Vector> points, std::vector<Index> home = {})
-      : points_(std::move(points)), home_(std::move(home)) {}
+  explicit System(std::shared_ptr<Vector> points, std::vector<Index> home = {});
+
+  ~System();
 
   /// Add a term; the pattern is made anew at the next use.
   void add(std::shared_ptr<Term> term);
@@ -96,6 +97,8 @@ class System {
   Definite definite() const;
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
+  /// The step d (dofs) from `u`, its free nodes on arcs: NodeRotations::along_arcs.
+  Vector along_arcs(const ConstVector& u, const ConstVector& d);
   /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only); of a
   /// quasi-definite one those of its last factor.
   /// With Method::Grid only whether one is negative: 1, or 0.
@@ -109,6 +112,7 @@ class System {
   FactorStatus prepare_inverse();
   void gather(double shift = 0.0);
   SymmetricSolver& symmetric();
+  const NodeRotations& rotations();
   void solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x);
   void count_work();
   void count_kept();
@@ -125,6 +129,7 @@ class System {
   Definite definite_ = Definite::Unknown; // of what current_ factorised
   std::unique_ptr<InverseSolver> inverse_;
   bool gmres_ = false;
+  std::unique_ptr<NodeRotations> rotations_; // outlives symmetric_
   std::unique_ptr<SymmetricSolver> symmetric_;
   Method method_ = Method::Direct;
   Corners corners_;
