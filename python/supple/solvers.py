@@ -58,8 +58,8 @@ def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
         multigrid.require_available()
         if not system.is_minimised():
             raise InputError(
-                'solver "multigrid" wants a body whose tangents are symmetric positive definite: no '
-                "pressure that follows, no mixed formulation, no inverse form; "
+                'solver "multigrid" wants a body whose tangents are symmetric positive definite: '
+                "no pressure that follows, no mixed formulation, no inverse form; "
                 'choose solver "direct".'
             )
     if not system.is_minimised():

@@ -61,7 +61,7 @@ def test_rigid_motions_are_in_the_range_of_the_prolongation(element):
 
 @pytest.mark.parametrize("element", ["P1", "P2", "Q2"])
 def test_a_cycle_is_symmetric_and_positive_definite(element):
-    """M as a dense matrix; the spectrum of M A, by numpy, lies in (0, 1.2) and is well conditioned."""
+    """M as a dense matrix; the spectrum of M A, by numpy, lies within (0.02, 1.2)."""
     grid, tangent, free = hierarchy(block(element, 8 if element == "P1" else 3))
     assert len(grid.rows) > 1
     M = np.column_stack([grid.apply(row) for row in np.eye(len(free))])
@@ -69,7 +69,7 @@ def test_a_cycle_is_symmetric_and_positive_definite(element):
     M = 0.5 * (M + M.T)
     root = np.linalg.cholesky(M)
     spectrum = np.linalg.eigvalsh(root.T @ tangent.toarray() @ root)
-    assert 0.02 < spectrum[0]
+    assert spectrum[0] > 0.02
     assert spectrum[-1] < 1.2
 
 
