@@ -130,3 +130,37 @@ TEST(forcing_is_never_looser_than_its_limit) {
     CHECK(eta > 0.0 && eta <= 1e-3);
   }
 }
+
+/// Against Eigen's Cholesky, with and without a preconditioner.
+TEST(conjugate_gradients_solution_equals_dense_solution) {
+  const Eigen::MatrixXd b = random_matrix(50, 0.4, 5), c = random_matrix(50, 0.2, 6);
+  const Eigen::MatrixXd a = b * b.transpose(), m = c * c.transpose();
+  const Vector rhs = Vector::LinSpaced(50, -1.0, 2.0), expected = a.llt().solve(rhs);
+  for (const bool preconditioned : {false, true}) {
+    Vector x = Vector::Zero(50);
+    const Operator other = preconditioned ? product(m) : Operator(identity);
+    const CgReport report = conjugate_gradients(product(a), other, rhs, x, {1e-12, 80});
+    CHECK(report.converged);
+    CHECK(report.definite != Definite::No);
+    CHECK_BELOW((x - expected).norm(), 1e-10 * expected.norm());
+  }
+}
+
+/// A diagonal matrix with one negative entry where the right-hand side has none: the solve does not
+/// see it and a probe does. Without that entry a probe knows that the matrix is definite.
+TEST(probe_finds_the_negative_eigenvalue_that_the_right_hand_side_spares) {
+  Vector diagonal = Vector::LinSpaced(400, 0.5, 2.0), rhs = Vector::Ones(400);
+  rhs[7] = 0.0;
+  for (const double entry : {-0.01, 0.7}) {
+    diagonal[7] = entry;
+    const Operator matrix = [&](const Vector& x, Vector& y) { y = diagonal.cwiseProduct(x); };
+    Vector x = Vector::Zero(400);
+    const CgReport blind = conjugate_gradients(matrix, identity, rhs, x, {1e-10, 100});
+    CHECK(blind.converged && blind.definite == Definite::Unknown);
+    x.setZero();
+    const CgReport probe = conjugate_gradients(matrix, identity, rhs, x, {1e-10, 100, true});
+    CHECK(probe.converged);
+    CHECK(probe.definite == (entry < 0.0 ? Definite::No : Definite::Yes));
+    CHECK_BELOW((diagonal.cwiseProduct(x) - rhs).norm(), 1e-9 * rhs.norm());
+  }
+}

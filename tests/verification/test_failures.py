@@ -135,7 +135,7 @@ def test_progress_sees_every_iteration_and_can_stop_a_solve():
 
 def test_newton_converges_quadratically():
     """Residuals of a smooth problem: the exponent of the last steps is near 2."""
-    history = block("Q1").gravity((0.0, 1.0, -2.0)).solve(load_steps=1).history
+    history = block("Q1").gravity((0.0, 0.3, -0.5)).solve(load_steps=1).history
     r = [h["residual"] for h in history if h["residual"] > 1e-11 * history[0]["residual"]]
     exponents = [np.log(r[i + 1] / r[i]) / np.log(r[i] / r[i - 1]) for i in range(1, len(r) - 1)]
     assert max(exponents) > 1.7, r
