@@ -54,6 +54,7 @@ void bind_terms(py::module_& module) {
       .def_readonly("term", &supple::VolumeRatio::term);
   py::class_<supple::Term, std::shared_ptr<supple::Term>>(module, "Term")
       .def_readwrite("is_load", &supple::Term::is_load)
+      .def_readwrite("is_silent", &supple::Term::is_silent)
       .def("energy", &supple::Term::energy)
       .def("residual",
            [](const supple::Term& term, const Vector& u) {

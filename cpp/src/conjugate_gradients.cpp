@@ -29,7 +29,7 @@ class RitzValues {
   /// Look at the values so far: what they say of a matrix of size `n`.
   void judge(Eigen::Index n, CgReport& report) const {
     const auto k = static_cast<Eigen::Index>(diagonal_.size());
-    if (k < kFewest) return;
+    if (k == 0) return;
     Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
     solver.computeFromTridiagonal(Eigen::Map<const Vector>(diagonal_.data(), k),
                                   Eigen::Map<const Vector>(beside_.data(), k - 1),
@@ -37,7 +37,7 @@ class RitzValues {
     report.spread = solver.eigenvalues()[0] / solver.eigenvalues()[k - 1];
     if (!(report.spread > 0.0)) {
       report.definite = Definite::No;
-    } else if (k >= probe_iterations(report.spread, static_cast<double>(n))) {
+    } else if (k >= kFewest && k >= probe_iterations(report.spread, static_cast<double>(n))) {
       report.definite = Definite::Yes;
     }
   }

@@ -19,6 +19,7 @@ constexpr int kPatience = 4;      // times more iterations where each is sure to
 constexpr double kCreeping = 1.0 / 32.0;       // of a step, below which there are better ways on
 constexpr double kSure = 0.1;                  // of the tolerance, that a chord's step is to reach
 constexpr double kLoosest = 0.1, kAlpha = 1.5; // of the forcing, where solves are iterated
+constexpr double kStraight = 1e-3;             // of the size: a step that turns nothing
 constexpr double kBent = 0.02; // of a step, by which arcs must differ to be looked at
 constexpr int kHopeless = 3;   // full steps in a row after which the residual must have halved
 
@@ -93,7 +94,7 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
 
 /// Lay the step on arcs where that leaves less force: what turns is then not stretched.
 void LoadStep::bend(const Vector& u, Vector& d, double s) {
-  if (!p_.has_energy) return;
+  if (!p_.has_energy || d.cwiseAbs().maxCoeff() < kStraight * p_.settings.size) return;
   const Vector arcs = p_.system.along_arcs(u, d);
   if (!((arcs - d).cwiseAbs().maxCoeff() > kBent * d.cwiseAbs().maxCoeff())) return;
   const double straight = p_.free_norm(p_.residual(u + d, s));

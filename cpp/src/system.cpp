@@ -36,7 +36,6 @@ void System::forget_factors() {
 }
 
 void System::use_method(Method method) {
-  if (method != method_) symmetric_.reset();
   method_ = method;
 }
 
@@ -89,21 +88,21 @@ Kind System::kind() const {
 double System::energy(const ConstVector& u, double load_factor) const {
   double total = 0.0;
   for (const auto& term : terms_)
-    total += factor_of(*term, load_factor) * term->energy(u);
+    if (!term->is_silent) total += factor_of(*term, load_factor) * term->energy(u);
   return total;
 }
 
 Vector System::residual(const ConstVector& u, double load_factor) const {
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_)
-    term->residual(u, factor_of(*term, load_factor), r);
+    if (!term->is_silent) term->residual(u, factor_of(*term, load_factor), r);
   return r;
 }
 
 Vector System::external(const ConstVector& u) const {
   Vector r = Vector::Zero(dofs());
   for (const auto& term : terms_) {
-    if (term->is_load) term->residual(u, -1.0, r);
+    if (term->is_load && !term->is_silent) term->residual(u, -1.0, r);
   }
   return r;
 }
@@ -136,7 +135,7 @@ const Vector& System::assemble_tangent(const ConstVector& u, double load_factor)
   values_.setZero(p.nonzeros());
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const double scale = factor_of(*terms_[t], load_factor);
-    if (scale != 0.0) terms_[t]->tangent(u, scale, p.scatter[t], values_);
+    if (scale != 0.0 && !terms_[t]->is_silent) terms_[t]->tangent(u, scale, p.scatter[t], values_);
   }
   return values_;
 }

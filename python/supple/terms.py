@@ -145,13 +145,15 @@ def refresh(built: Built, d: Description) -> None:
         for part in parts:
             set_values(part.term, {n: v[part.rows] for n, v in skin.values.items()})
     if built.body_force is not None:
-        built.body_force.set_field("value", (d.density * d.gravity).ravel())
+        weight = d.density * d.gravity
+        built.body_force.set_field("value", weight.ravel())
+        built.body_force.is_silent = not weight.any()
     for parts, load in [*zip(built.tractions, d.tractions, strict=True),
                         *zip(built.pressures, d.pressures, strict=True)]:  # fmt: skip
         for part in parts:
             part.term.set_field("value", np.tile(load.value, len(part.rows)))
-    weight = 0.0 if d.masses is None else np.outer(d.masses, d.gravity)
-    built.forces.set_forces((d.forces + weight).ravel())
+    pull = 0.0 if d.masses is None else np.outer(d.masses, d.gravity)
+    built.forces.set_forces((d.forces + pull).ravel())
 
 
 def nodal_masses(d: Description) -> Floats:

@@ -40,6 +40,8 @@ class Term {
 
   /// Whether the load factor scales this term.
   bool is_load = false;
+  /// It is zero whatever the displacement, as gravity is where there is none: not evaluated.
+  bool is_silent = false;
 };
 
 /// Forces on nodes that depend on nothing.
