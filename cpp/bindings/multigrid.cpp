@@ -45,13 +45,13 @@ void bind_multigrid(py::module_& module) {
         pattern.start = start;
         pattern.row = row;
         pattern.lower = true;
-        return std::make_unique<Bound>(Bound{
-            std::move(pattern),
-            std::make_unique<supple::Multigrid>(dof, points, supple::Corners{corner_start, corner},
-                                                python_aggregate(aggregate))});
+        return std::make_unique<Bound>(
+            Bound{std::move(pattern),
+                  std::make_unique<supple::Multigrid>(
+                      dof, [points] { return points; }, supple::Corners{corner_start, corner},
+                      python_aggregate(aggregate))});
       }))
       .def("update", [](Bound& b, const Vector& v) { return b.grid->update(b.pattern, v).ok(); })
-      .def("coarsen_anew", [](Bound& b, const Vector& points) { b.grid->coarsen_anew(points); })
       .def("apply",
            [](Bound& b, const Vector& r) {
              Vector z(r.size());
@@ -64,6 +64,15 @@ void bind_multigrid(py::module_& module) {
              Vector y(x.size());
              b.grid->multiply(x, y);
              return y;
+           })
+      .def("prolongation",
+           [](const Bound& b, std::size_t level) {
+             const supple::BlockMatrix<float>& P = b.grid->prolongation(level);
+             const py::array_t<float> values({static_cast<py::ssize_t>(P.blocks()),
+                                              static_cast<py::ssize_t>(P.width),
+                                              static_cast<py::ssize_t>(P.height)},
+                                             P.value.data());
+             return py::make_tuple(P.start, P.column, values);
            })
       .def_property_readonly("rows", [](const Bound& b) { return b.grid->rows(); })
       .def_property_readonly("complexity", [](const Bound& b) { return b.grid->complexity(); });

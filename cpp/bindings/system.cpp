@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include "aggregate.hpp"
 #include "core.hpp"
 #include "supple/kernel_term.hpp"
 #include "supple/newton.hpp"
@@ -183,7 +184,8 @@ void bind_system(py::module_& module) {
       .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
   py::enum_<supple::Method>(module, "Method")
       .value("direct", supple::Method::Direct)
-      .value("cg", supple::Method::Kept);
+      .value("cg", supple::Method::Kept)
+      .value("multigrid", supple::Method::Grid);
   py::class_<System>(module, "System")
       .def(py::init([](Vector points, std::vector<supple::Index> home) {
         return std::make_unique<System>(std::make_shared<Vector>(std::move(points)),
@@ -195,7 +197,13 @@ void bind_system(py::module_& module) {
       .def("set_free", &System::set_free)
       .def("use_gmres", &System::use_gmres)
       .def("use_method", &System::use_method)
+      .def("predicted_factor", &System::predicted_factor)
       .def("forget_kept", &System::forget_kept)
+      .def("use_grid",
+           [](System& system, std::vector<supple::Index> start, std::vector<supple::Index> corner,
+              const py::function& aggregate) {
+             system.use_grid({std::move(start), std::move(corner)}, python_aggregate(aggregate));
+           })
       .def("energy", &System::energy, Unlocked())
       .def("residual",
            py::overload_cast<const supple::ConstVector&, double>(&System::residual, py::const_),

@@ -12,7 +12,7 @@ namespace supple {
 namespace {
 
 constexpr Index kCoarsest = 400;      // block rows that a direct factor takes
-constexpr int kUpdate = 8;            // iterations that cost as much as an update: measured
+constexpr int kUpdate = 13;            // iterations that cost as much as an update: measured
 constexpr double kLeastShrink = 0.75; // of the block rows from level to level, else it is coarsest
 
 struct Level {
@@ -68,17 +68,19 @@ CscPattern lower_pattern(const BlockMatrix<double>& A, std::vector<std::ptrdiff_
 } // namespace
 
 struct Multigrid::State {
-  State(std::vector<Index> dof_, const Vector& points_, Corners corners_, Aggregate aggregate_)
-      : dof(std::move(dof_)), points(points_), corners(std::move(corners_)),
+  State(std::vector<Index> dof_, Places places_, Corners corners_, Aggregate aggregate_)
+      : dof(std::move(dof_)), places(std::move(places_)), corners(std::move(corners_)),
         aggregate(std::move(aggregate_)) {}
 
   FactorStatus update(const CscPattern& pattern, const Vector& values);
-  FactorStatus take(std::size_t number, const BlockMatrix<double>& A);
+  void take(const CscPattern& pattern, const Vector& values);
+  FactorStatus smooth(std::size_t number, const BlockMatrix<double>& A);
   FactorStatus factorise(const BlockMatrix<double>& A);
   bool prolong(std::size_t number, const BlockMatrix<double>& A);
   void cycle(std::size_t number);
 
   std::vector<Index> dof;
+  Places places;
   Vector points;
   Corners corners;
   Aggregate aggregate;
@@ -95,15 +97,13 @@ struct Multigrid::State {
   Vector in, out;       // of multiply
 };
 
-Multigrid::Multigrid(std::vector<Index> dof, const Vector& points, Corners corners,
-                     Aggregate aggregate)
-    : state_(std::make_unique<State>(std::move(dof), points, std::move(corners),
+Multigrid::Multigrid(std::vector<Index> dof, Places places, Corners corners, Aggregate aggregate)
+    : state_(std::make_unique<State>(std::move(dof), std::move(places), std::move(corners),
                                      std::move(aggregate))) {}
 
 Multigrid::~Multigrid() = default;
 
-void Multigrid::coarsen_anew(const Vector& points) {
-  state_->points = points;
+void Multigrid::start_over() {
   state_->anew = true;
 }
 
@@ -114,17 +114,17 @@ FactorStatus Multigrid::update(const CscPattern& pattern, const Vector& values) 
 FactorStatus Multigrid::State::update(const CscPattern& pattern, const Vector& values) {
   good = false;
   if (!std::isfinite(values.sum())) return {FactorStatus::Cause::NotFinite, -1};
-  if (!blocks) blocks = std::make_unique<NodeBlocks>(pattern, dof);
-  blocks->fill(pattern, values);
+  take(pattern, values);
   if (anew) {
     levels.clear();
+    points = places();
     modes = rigid_motions(points, blocks->node(), blocks->free());
   }
   BlockMatrix<double> coarse;
   const BlockMatrix<double>* A = &blocks->matrix();
   for (std::size_t k = 0;; ++k) {
     if (anew) levels.emplace_back();
-    if (const FactorStatus status = take(k, *A); !status.ok()) return status;
+    if (const FactorStatus status = smooth(k, *A); !status.ok()) return status;
     if (anew ? !prolong(k, *A) : levels[k].is_coarsest()) break;
     coarse = product(levels[k].R, product(*A, levels[k].P));
     fill_zero_diagonal(coarse);
@@ -136,8 +136,13 @@ FactorStatus Multigrid::State::update(const CscPattern& pattern, const Vector& v
   return status;
 }
 
+void Multigrid::State::take(const CscPattern& pattern, const Vector& values) {
+  if (!blocks) blocks = std::make_unique<NodeBlocks>(pattern, dof);
+  blocks->fill(pattern, values);
+}
+
 /// The level's matrix and what smooths it.
-FactorStatus Multigrid::State::take(std::size_t number, const BlockMatrix<double>& A) {
+FactorStatus Multigrid::State::smooth(std::size_t number, const BlockMatrix<double>& A) {
   Level& level = levels[number];
   Index lost = -1;
   inverse = inverse_diagonal(A, lost);
@@ -225,7 +230,11 @@ void Multigrid::apply(const Vector& r, Vector& z) {
     z[static_cast<Eigen::Index>(k)] = scale * finest.x[static_cast<std::size_t>(place[k])];
 }
 
-void Multigrid::multiply(const Vector& x, Vector& y) {
+void Multigrid::take(const CscPattern& pattern, const Vector& values) {
+  state_->take(pattern, values);
+}
+
+bool Multigrid::multiply(const Vector& x, Vector& y) {
   State& s = *state_;
   const std::vector<Index>& place = s.blocks->place();
   const BlockMatrix<double>& A = s.blocks->matrix();
@@ -237,6 +246,7 @@ void Multigrid::multiply(const Vector& x, Vector& y) {
   supple::multiply(A, s.in.data(), s.out.data());
   for (std::size_t k = 0; k < place.size(); ++k)
     y[static_cast<Eigen::Index>(k)] = s.out[place[k]];
+  return true;
 }
 
 int Multigrid::break_even() const {
@@ -248,6 +258,10 @@ double Multigrid::bytes() const {
   for (const Level& level : state_->levels)
     bytes += 4.0 * static_cast<double>(level.A.value.size() + 2 * level.P.value.size());
   return bytes;
+}
+
+const BlockMatrix<float>& Multigrid::prolongation(std::size_t level) const {
+  return state_->levels.at(level).P;
 }
 
 std::vector<Index> Multigrid::rows() const {

@@ -29,12 +29,15 @@ class Path {
     return Outcome::Converged;
   }
 
-  /// The whole load at once; by descent where there is an energy, or kinks to get past; the path.
+  /// The whole load at once; by descent where there is an energy, or kinks to get past; the path,
+  /// along which multigrid, without a factor of indefinite tangents, cannot go.
   Outcome adaptive_steps() {
     Outcome outcome = p_.settings.follow ? Outcome::Stalled : reach(1.0, Manner::Full);
     const bool descends = (p_.minimises || p_.settings.kinks) && verdict_ == Outcome::Converged;
+    const bool unstable = outcome == Outcome::Unstable;
     if (ends(outcome) && descends && !p_.settings.follow) outcome = reach(1.0, Manner::Guarded);
-    if (ends(outcome)) outcome = ArcLength(p_, step_, verdict_).run();
+    if (ends(outcome) && unstable && p_.system.has_grid()) return Outcome::Unstable;
+    if (ends(outcome) && !p_.system.has_grid()) outcome = ArcLength(p_, step_, verdict_).run();
     const bool lost = outcome == Outcome::Stalled || outcome == Outcome::Inverted;
     return lost && p_.minimises ? halved_steps() : outcome;
   }

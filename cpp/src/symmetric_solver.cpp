@@ -1,6 +1,7 @@
 #include "supple/symmetric_solver.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "node_rotations.hpp"
 #include "stopwatch.hpp"
@@ -9,7 +10,13 @@
 namespace supple {
 namespace {
 
-constexpr int kFewest = 30; // iterations that are always granted
+constexpr int kFewest = 30;    // iterations that are always granted
+constexpr int kMost = 300;     // to a preconditioner that is not exact
+constexpr double kFaded = 0.5; // of the rate at first, where a preconditioner is begun from nothing
+
+double digits(const CgReport& report) {
+  return report.residual > 0.0 ? -std::log10(report.residual) : 16.0;
+}
 
 } // namespace
 
@@ -24,25 +31,43 @@ void SymmetricSolver::forget() {
   usable_ = false;
 }
 
-FactorStatus SymmetricSolver::prepare(const Vector& values, const ConstVector& u) {
+void SymmetricSolver::take(const Vector& values, const ConstVector& u) {
   values_ = &values;
   turn_ = rotations_.at(u);
   fresh_ = false;
   if (usable_) set_turn();
   definite_ = Definite::Unknown;
-  return usable_ && !worn_ ? FactorStatus{} : renew();
+}
+
+FactorStatus SymmetricSolver::prepare(const Vector& values, const ConstVector& u) {
+  take(values, u);
+  if (!usable_ || worn_) return renew();
+  kept_->take(pattern_, values);
+  return {};
+}
+
+FactorStatus SymmetricSolver::prove(const Vector& values, const ConstVector& u) {
+  take(values, u);
+  const FactorStatus status = renew();
+  if (!status.ok() || definite_ != Definite::Unknown) return status;
+  Vector x = Vector::Zero(pattern_.size);
+  iterate(Vector::Ones(x.size()), 1.0, true, x);
+  if (definite_ == Definite::No) return {FactorStatus::Cause::NotPositiveDefinite, -1};
+  return status;
 }
 
 FactorStatus SymmetricSolver::renew() {
   const Stopwatch watch(work.factor);
   if (!kept_) kept_ = make_();
+  anew_ = rate_ < kFaded * best_rate_ || !usable_;
+  if (anew_) kept_->start_over();
   const FactorStatus status = kept_->update(pattern_, *values_);
   ++work.factorisations;
   usable_ = fresh_ = status.ok();
   worn_ = false;
   turned_ = turn_;
   spread_ = 1.0;
-  if (status.ok()) definite_ = Definite::Yes;
+  if (status.ok() && kept_->exact()) definite_ = Definite::Yes;
   if (status.cause == FactorStatus::Cause::NotPositiveDefinite) definite_ = Definite::No;
   return status;
 }
@@ -50,7 +75,9 @@ FactorStatus SymmetricSolver::renew() {
 CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool probe, Vector& x) {
   const Stopwatch watch(work.solve);
   Vector turned(rhs.size());
-  const auto matrix = [&](const Vector& in, Vector& out) { product_->apply(*values_, in, out); };
+  const auto matrix = [&](const Vector& in, Vector& out) {
+    if (!kept_->multiply(in, out)) product_->apply(*values_, in, out);
+  };
   const auto preconditioner = [&](const Vector& in, Vector& out) {
     if (fresh_) return kept_->apply(in, out);
     rotations_.turn_back(since_, in, turned);
@@ -59,14 +86,28 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   };
   const int saved = kept_->break_even();
   const bool unsure = probe && definite_ == Definite::Unknown;
-  const CgReport report = conjugate_gradients(matrix, preconditioner, rhs, x,
-                                              {tolerance, std::max(kFewest, 2 * saved), unsure});
+  const int limit = kept_->exact() ? std::max(kFewest, 2 * saved) : kMost;
+  const CgReport report =
+      conjugate_gradients(matrix, preconditioner, rhs, x, {tolerance, limit, unsure});
   work.iterations += report.iterations;
   if (report.spread != 0.0) spread_ = report.spread;
-  worn_ = !fresh_ && report.iterations > saved;
+  if (fresh_) rate(report);
+  worn_ = !fresh_ && excess(report) > saved;
   if (report.definite != Definite::Unknown && definite_ == Definite::Unknown)
     definite_ = report.definite;
   return report;
+}
+
+/// Iterations more than a fresh preconditioner would have needed.
+int SymmetricSolver::excess(const CgReport& report) const {
+  if (kept_->exact() || !(rate_ > 0.0)) return report.iterations;
+  return report.iterations - static_cast<int>(std::ceil(digits(report) / rate_));
+}
+
+void SymmetricSolver::rate(const CgReport& report) {
+  if (report.iterations < 2 || !report.converged) return;
+  rate_ = digits(report) / report.iterations;
+  if (anew_) best_rate_ = rate_;
 }
 
 /// Q of each node, from where the factor was made to where the matrix is.
@@ -77,6 +118,7 @@ void SymmetricSolver::set_turn() {
 }
 
 bool SymmetricSolver::cheap_to_probe(double size) const {
+  if (!kept_->exact()) return true; // a new one would not tell
   return probe_iterations(spread_, size) <= kept_->break_even();
 }
 

@@ -40,6 +40,11 @@ void System::use_method(Method method) {
   method_ = method;
 }
 
+void System::use_grid(Corners corners, Aggregate aggregate) {
+  corners_ = std::move(corners);
+  aggregate_ = std::move(aggregate);
+}
+
 void System::forget_kept() {
   if (symmetric_) symmetric_->forget();
 }
@@ -196,54 +201,80 @@ const Vector& System::full_tangent() {
   return values_;
 }
 
-const Vector& System::reduced_tangent() {
-  if (kind() != Kind::Unsymmetric) return lower_values_;
-  reduced_.resize(reduction().pattern.nonzeros());
-  reduction().gather(values_, reduced_);
+/// The reduced values of the tangent last assembled, plus `shift` times their diagonal's mean.
+const Vector& System::reduced_tangent(double shift) {
+  const Reduction& r = reduction();
+  if (kind() == Kind::Unsymmetric) {
+    reduced_.resize(r.pattern.nonzeros());
+    r.gather(values_, reduced_);
+  } else if (shift > 0.0) {
+    reduced_ = lower_values_;
+  } else {
+    return lower_values_;
+  }
+  if (shift <= 0.0) return reduced_;
+  // The lower triangle's columns begin with their diagonal entry.
+  double mean = 0.0;
+  for (std::int64_t j = 0; j < r.pattern.size; ++j)
+    mean += std::abs(reduced_[r.pattern.start[static_cast<std::size_t>(j)]]);
+  mean /= static_cast<double>(r.pattern.size);
+  for (std::int64_t j = 0; j < r.pattern.size; ++j)
+    reduced_[r.pattern.start[static_cast<std::size_t>(j)]] += shift * mean;
   return reduced_;
+}
+
+std::pair<double, double> System::predicted_factor() {
+  if (!factor_) {
+    const Reduction& r = reduction();
+    const Stopwatch watch(timings.analysis);
+    factor_ = std::make_unique<Factor>(kind());
+    factor_->analyse(r.pattern);
+  }
+  return {factor_->flops(), factor_->nonzeros()};
 }
 
 FactorStatus System::factorise(double shift) {
   const Reduction& r = reduction();
   if (iterates()) return prepare_inverse();
+  if (has_grid()) {
+    const FactorStatus status = symmetric().prove(reduced_tangent(shift), at_);
+    count_kept();
+    return status;
+  }
   if (!factor_) {
     const Stopwatch analysing(timings.analysis);
     factor_ = std::make_unique<Factor>(kind());
     factor_->analyse(r.pattern);
   }
   const Stopwatch watch(timings.factor);
-  const Vector* values = &reduced_tangent();
-  if (shift > 0.0) {
-    reduced_ = *values;
-    values = &reduced_;
-    // The lower triangle's columns begin with their diagonal entry.
-    double mean = 0.0;
-    for (std::int64_t j = 0; j < r.pattern.size; ++j) {
-      mean += std::abs(reduced_[r.pattern.start[static_cast<std::size_t>(j)]]);
-    }
-    mean /= static_cast<double>(r.pattern.size);
-    for (std::int64_t j = 0; j < r.pattern.size; ++j) {
-      reduced_[r.pattern.start[static_cast<std::size_t>(j)]] += shift * mean;
-    }
-  }
+  const Vector& values = reduced_tangent(shift);
   current_ = factor_.get();
   ++timings.factorisations;
-  const FactorStatus status = factor_->factorise(*values);
+  const FactorStatus status = factor_->factorise(values);
   definite_ = status.ok() && kind() == Kind::Cholesky && shift == 0.0    ? Definite::Yes
               : status.cause == FactorStatus::Cause::NotPositiveDefinite ? Definite::No
                                                                          : Definite::Unknown;
   return status;
 }
 
+/// What solves on a preconditioner, which becomes what `solve` uses.
+SymmetricSolver& System::symmetric() {
+  current_ = nullptr;
+  if (symmetric_) return *symmetric_;
+  const Stopwatch watch(timings.analysis);
+  MakePreconditioner make = make_factor_preconditioner;
+  if (has_grid())
+    make = [this] {
+      const Places places = [this]() -> Vector { return *points_ + at_.head(points_->size()); };
+      return std::make_unique<Multigrid>(reduction().dof, places, corners_, aggregate_);
+    };
+  symmetric_ = std::make_unique<SymmetricSolver>(reduction().pattern, rotations(), make);
+  return *symmetric_;
+}
+
 FactorStatus System::prepare() {
   if (!keeps()) return factorise();
-  if (!symmetric_) {
-    const Stopwatch watch(timings.factor);
-    symmetric_ = std::make_unique<SymmetricSolver>(reduction().pattern, rotations(),
-                                                   make_factor_preconditioner);
-  }
-  current_ = nullptr;
-  const FactorStatus status = symmetric_->prepare(reduced_tangent(), at_);
+  const FactorStatus status = symmetric().prepare(reduced_tangent(), at_);
   count_kept();
   return status;
 }
@@ -300,6 +331,7 @@ void System::count_work() {
 }
 
 FactorStatus System::factorise_indefinite() {
+  if (has_grid()) return {FactorStatus::Cause::NotPositiveDefinite, -1}; // it has no such factor
   const Reduction& r = reduction();
   if (!indefinite_) {
     const Stopwatch analysing(timings.analysis);
@@ -339,6 +371,7 @@ Vector System::apply(const ConstVector& x) {
 }
 
 Inertia System::inertia() {
+  if (has_grid()) return {factorise().ok() ? 0 : 1, 0, 0, 0.0}; // as far as it can tell
   if (kind() == Kind::QuasiDefinite && factor_) return factor_->inertia();
   if (!factorise_indefinite().ok()) return {0, 1, 0, 0.0};
   return indefinite_->inertia();

@@ -292,6 +292,7 @@ class Body:
             solver: of the linear equations. "direct" factorises at every iteration. "cg" keeps
                 factors, over iterations, load steps and solves of this body, and iterates on them,
                 so that a result depends on what was solved before, by less than the tolerances.
+                "multigrid" (extra "multigrid") never factorises the whole matrix: for large bodies.
                 "auto" picks one; `State.timings["solver"]` says which and why.
             progress: called with a dict after each iteration; may raise to stop.
 

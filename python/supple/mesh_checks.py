@@ -75,9 +75,9 @@ def check_cells(cells: Ints, element: Element, nodes: int) -> None:
     if len(bad):
         raise MeshError(f"cells {some(bad)} name a node twice; remove these collapsed cells.")
     group = groups(ordered)
-    first = np.unique(group, return_index=True)[1]
-    bad = np.setdiff1d(np.arange(len(cells)), first)
-    if len(bad):
+    if group.max() + 1 < len(cells):
+        first = np.unique(group, return_index=True)[1]
+        bad = np.setdiff1d(np.arange(len(cells)), first)
         raise MeshError(f"cells {some(bad)} repeat an earlier cell; remove the duplicates.")
     unused = np.flatnonzero(np.bincount(cells.ravel(), minlength=nodes) == 0)
     if len(unused):

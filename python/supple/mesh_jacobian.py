@@ -25,8 +25,17 @@ _IDEAL = {
 def jacobians(points: Floats, cells: Ints, element: Element, at: Floats) -> Floats:
     """dX/dξ (n, 3, 3) of every cell (n, nodes) at one reference point ``at`` (3,)."""
     slopes = element.gradients(at[None, :])[0]
-    result: Floats = np.einsum("cni,nj->cij", points[cells], slopes)
-    return result
+    return np.asarray(np.swapaxes(points[cells], 1, 2) @ slopes)
+
+
+def determinants(J: Floats) -> Floats:
+    """det (n,) of matrices (n, 3, 3), written out: many times faster than one by one."""
+    a, b, c = J[:, 0], J[:, 1], J[:, 2]
+    return np.asarray(
+        a[:, 0] * (b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1])
+        + a[:, 1] * (b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2])
+        + a[:, 2] * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+    )
 
 
 def quadrature(element: Element) -> tuple[Floats, Floats]:
@@ -68,7 +77,7 @@ def volumes(points: Floats, cells: Ints, element: Element) -> Floats:
     """Signed volume (n,) of every cell, m³."""
     total = np.zeros(len(cells))
     for at, weight in zip(*quadrature(element), strict=True):
-        total += weight * np.linalg.det(jacobians(points, cells, element, at))
+        total += weight * determinants(jacobians(points, cells, element, at))
     return total
 
 
@@ -80,7 +89,7 @@ def smallest_jacobian(points: Floats, cells: Ints, element: Element) -> Floats:
     at = np.vstack([element.points, _kernel_points(element)])
     if element.name == "P1":
         at = at[:1]
-    dets = [np.linalg.det(jacobians(points, cells, element, x)) for x in at]
+    dets = [determinants(jacobians(points, cells, element, x)) for x in at]
     arms = points[cells[:, 1 : element.corners]] - points[cells[:, :1]]
     length = np.linalg.norm(arms, axis=2).max(axis=1)
     result: Floats = np.min(dets, axis=0) / np.maximum(length, np.finfo(float).tiny ** 0.25) ** 3
@@ -109,7 +118,7 @@ def mean_ratio(points: Floats, cells: Ints, element: Element) -> Floats:
     ideal = _IDEAL[element.cell.name]
     for at in element.points[: element.corners]:
         corner = jacobians(points, cells, element, at) @ ideal
-        det = np.maximum(np.linalg.det(corner), 0.0)
+        det = np.maximum(determinants(corner), 0.0)
         norm = np.maximum((corner**2).sum(axis=(1, 2)), np.finfo(float).tiny)
         worst = np.minimum(worst, 3 * det ** (2 / 3) / norm)
     return worst

@@ -15,13 +15,27 @@ def groups(rows: Ints) -> Ints:
     """Number (n,) of the group of each row (n, k) of ids: equal rows have equal numbers.
 
     Ids are >= 0 but in the first column, where they may be anything.
-    Columns are folded one by one, so nothing overflows while n · (largest id) < 2⁶³.
+    Columns are folded into one number and only sorted where that would pass 2⁶³; nothing overflows
+    while n · (largest id) stays below that.
     """
-    _, group = np.unique(rows[:, 0], return_inverse=True)
+    group = rows[:, 0] - rows[:, 0].min(initial=0)
+    count = int(group.max(initial=0)) + 1
     for column in rows[:, 1:].T:
-        pair = group * (int(column.max(initial=0)) + 1) + column
-        _, group = np.unique(pair, return_inverse=True)
-    return np.asarray(group, dtype=np.int64)
+        width = int(column.max(initial=0)) + 1
+        if count * width >= 2**63:
+            group = _ranks(group)
+            count = int(group.max(initial=0)) + 1
+        group, count = group * width + column, count * width
+    return _ranks(group)
+
+
+def _ranks(numbers: Ints) -> Ints:
+    """Rank (n,) of each number among the different ones."""
+    order = np.argsort(numbers, kind="stable")
+    ordered = numbers[order]
+    rank = np.empty(len(numbers), dtype=np.int64)
+    rank[order] = np.cumsum(np.append(0, ordered[1:] != ordered[:-1]))[: len(numbers)]
+    return rank
 
 
 def corner_groups(*blocks: Ints) -> list[Ints]:

@@ -58,7 +58,7 @@ def aggregate(start: Ints, column: Ints, modes: Floats) -> tuple[int, Ints, Floa
     graph = csr_array((np.ones(len(column), np.int8), column, start), (n, n))
     members, _ = standard_aggregation(graph)
     basis, coarse = fit_candidates(members, modes)
-    number = np.full(n, -1, dtype=np.int32)
+    number = np.full(n, -1, dtype=np.int64)
     inside = np.diff(members.indptr) > 0
     number[inside] = members.indices
     rows = np.zeros((n, len(modes) // n, 6))

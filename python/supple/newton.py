@@ -95,7 +95,7 @@ def run(
     scalars = np.zeros(built.system.scalars)
     built.system.set_free(np.append(~fixed.ravel(), scalars == 0))
     built.solver = solvers.pick(settings.solver, built.system, int((~fixed).sum()), gmres)
-    solvers.use(built.solver, built.system)
+    solvers.use(built.solver, built.system, body.mesh)
     built.system.reset_timings()
     target = np.append(-body._prescribed if inverse else body._prescribed, scalars)
     if start is None:

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from . import multigrid
 from .choices import SYMMETRIC_SOLVERS
 from .core import core
 from .errors import InputError
 
+if TYPE_CHECKING:
+    from .mesh import Mesh
+
 #: Unknowns from which a factor is worth keeping: below, making one costs no more than calls do.
 _KEEP = 2_000
+#: Flops of a factor for each unknown from which multigrid is quicker, forming and solving; measured
+#: on blocks, where that is some 60,000 unknowns.
+_HEAVY = 1e6
+#: Unknowns below which no factor is that heavy, and above which it need not be asked.
+_LIGHT, _HUGE = 30_000, 300_000
 
 
 @dataclass(frozen=True)
@@ -45,17 +54,37 @@ def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
     """
     if gmres:
         return Pick("gmres", "one symmetric factor serves many unsymmetric tangents")
+    if asked == "multigrid":
+        multigrid.require_available()
+        if not system.is_minimised():
+            raise InputError(
+                'solver "multigrid" wants a body whose tangents are symmetric positive definite: '
+                "no pressure that follows, no mixed formulation, no inverse form; "
+                'choose solver "direct".'
+            )
     if not system.is_minimised():
         return Pick("direct", "only tangents that should be positive definite have another way")
     if asked != "auto":
         return Pick(asked, "as asked")
     if unknowns < _KEEP:
         return Pick("direct", f"a factor of {unknowns:,} unknowns costs less than iterations")
-    return Pick("cg", f"a factor of {unknowns:,} unknowns is worth keeping")
+    if unknowns < _LIGHT:
+        return Pick("cg", f"a factor of {unknowns:,} unknowns is worth keeping")
+    if multigrid.available() and unknowns > _HUGE:
+        return Pick("multigrid", f"{unknowns:,} unknowns are many for a factor")
+    flops, entries = system.predicted_factor()
+    size = f"a factor of {unknowns:,} unknowns takes {flops:.1e} flops and {8e-9 * entries:.1f} GB"
+    if flops < _HEAVY * unknowns:
+        return Pick("cg", f"{size}, worth keeping")
+    if multigrid.available():
+        return Pick("multigrid", f"{size}, more than iterations do")
+    return Pick("cg", f'{size}; pip install "supple[multigrid]" would spare that')
 
 
-def use(picked: Pick, system: Any) -> None:
+def use(picked: Pick, system: Any, mesh: Mesh) -> None:
     """Solve the system's symmetric tangents so from now on."""
     system.use_gmres(picked.name == "gmres")
+    if picked.name == "multigrid":
+        system.use_grid(*multigrid.corners(mesh), multigrid.aggregate)
     if picked.name != "gmres":
         system.use_method(getattr(core().Method, picked.name))

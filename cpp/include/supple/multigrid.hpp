@@ -40,33 +40,36 @@ struct Corners {
   std::vector<Index> corner; ///< node numbers
 };
 
+/// Where the nodes of the mesh are at present (3 nodes), m.
+using Places = std::function<Vector()>;
+
 class Multigrid final : public Preconditioner {
  public:
   /// @param dof (unknowns) 3·node + direction of each unknown, ascending.
-  /// @param points (3 nodes) places of all nodes of the mesh, m, whose rigid motions are meant.
-  Multigrid(std::vector<Index> dof, const Vector& points, Corners corners, Aggregate aggregate);
+  /// @param places gives (3 nodes) where all nodes of the mesh are, m: rigid motions are of those.
+  Multigrid(std::vector<Index> dof, Places places, Corners corners, Aggregate aggregate);
   ~Multigrid() override;
 
-  /// Take over a matrix; the first time, and after `coarsen_anew`, it also makes the aggregates.
+  /// Take over a matrix; the first time, and after start_over, it also makes the aggregates.
   ///
   /// NotPositiveDefinite where a diagonal block or the coarsest matrix shows that; a matrix may be
   /// indefinite all the same.
   /// @throws ShapeError where sizes do not fit; whatever the aggregation throws.
   FactorStatus update(const CscPattern& pattern, const Vector& values) override;
 
-  /// The next update makes new aggregates, with the rigid motions of nodes at `points`.
-  void coarsen_anew(const Vector& points);
-
   /// z = one V-cycle on r; both (unknowns).
   /// @throws StateError unless the last update was ok.
   void apply(const Vector& r, Vector& z) override;
 
-  /// y = A x with the matrix at hand; both (unknowns).
-  void multiply(const Vector& x, Vector& y);
-
+  bool exact() const override { return false; }
+  void take(const CscPattern& pattern, const Vector& values) override;
+  bool multiply(const Vector& x, Vector& y) override;
+  void start_over() override;
   int break_even() const override;
   double bytes() const override;
 
+  /// From level `level` + 1 to `level`, the finest being 0.
+  const BlockMatrix<float>& prolongation(std::size_t level) const;
   /// Block rows of each level, the finest first.
   std::vector<Index> rows() const;
   /// Entries of all levels' matrices over those of the finest.

@@ -22,6 +22,14 @@ class Preconditioner {
   /// How many iterations an update costs: with more than so many it pays to make M anew. From
   /// counts and not from the clock, so that the same problem is solved in the same way each time.
   virtual int break_even() const = 0;
+  /// Whether M is A itself, so that an update that was ok proves A positive definite.
+  virtual bool exact() const { return true; }
+  /// Another matrix is at hand, for which M may still serve: keep what multiply needs of it.
+  virtual void take(const CscPattern&, const Vector&) {}
+  /// y = A x with the matrix last taken or updated; false where there is no quick way to it.
+  virtual bool multiply(const Vector&, Vector&) { return false; }
+  /// The next update makes anew also what does not depend on the values alone.
+  virtual void start_over() {}
   /// Bytes that one more of its kind would take, once it was made.
   virtual double bytes() const = 0;
 };

@@ -44,6 +44,10 @@ class SymmetricSolver {
   /// @param probe find out, too, whether K is positive definite: see definite().
   FactorStatus solve(const Vector& rhs, double tolerance, bool probe, Vector& x);
 
+  /// Take the values as `prepare` does, make a preconditioner of them in any case, and find out
+  /// whether they are positive definite; NotPositiveDefinite where they are not.
+  FactorStatus prove(const Vector& values, const ConstVector& u);
+
   /// What is known of the matrix at hand.
   Definite definite() const { return definite_; }
 
@@ -54,6 +58,9 @@ class SymmetricSolver {
 
  private:
   FactorStatus renew();
+  void take(const Vector& values, const ConstVector& u);
+  int excess(const CgReport& report) const;
+  void rate(const CgReport& report);
   void set_turn();
   bool cheap_to_probe(double size) const;
   CgReport iterate(const Vector& rhs, double tolerance, bool probe, Vector& x);
@@ -67,6 +74,9 @@ class SymmetricSolver {
   bool usable_ = false;                                // it was made, and that was ok
   bool fresh_ = false;                                 // of the matrix at hand
   bool worn_ = false;                                  // a new one would have cost less
+  bool anew_ = true;                                   // it was made from nothing
+  double rate_ = 0.0;                                  // digits an iteration, when it was fresh
+  double best_rate_ = 0.0;                             // and when it had been made from nothing
   double spread_ = 0.0; // of the last matrix solved with, seen through what is kept
   Definite definite_ = Definite::Unknown;
   const Vector* values_ = nullptr;

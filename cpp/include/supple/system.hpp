@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "supple/inverse_solver.hpp"
 #include "supple/linear.hpp"
+#include "supple/multigrid.hpp"
 #include "supple/symmetric_solver.hpp"
 #include "supple/term.hpp"
 
@@ -22,7 +24,8 @@ struct Timings {
 /// How the tangents of a symmetric positive definite body are solved with.
 enum class Method {
   Direct, ///< a factor of each
-  Kept    ///< conjugate gradients on a factor that is kept while it serves
+  Kept,   ///< conjugate gradients on a factor that is kept while it serves
+  Grid    ///< conjugate gradients on multigrid; the whole matrix is never factorised
 };
 
 class System {
@@ -46,6 +49,10 @@ class System {
   /// go of when the method changes, or with forget_kept.
   void use_method(Method method);
   void forget_kept();
+  /// What Method::Grid makes its levels of: see Multigrid.
+  void use_grid(Corners corners, Aggregate aggregate);
+  /// Whether tangents are solved with by multigrid, which knows no inertia of indefinite ones.
+  bool has_grid() const { return method_ == Method::Grid && kind() == Kind::Cholesky; }
 
   Index scalars() const { return static_cast<Index>(home_.size()); }
   Index dofs() const { return static_cast<Index>(points_->size()) + scalars(); }
@@ -77,8 +84,9 @@ class System {
   const Reduction& reduction();
   /// K at u: of symmetric kinds straight into the values of reduction().pattern, else in CSR.
   void assemble_tangent(const ConstVector& u, double load_factor);
-  /// Values on reduction().pattern of the tangent last assembled.
-  const Vector& reduced_tangent();
+  /// Values on reduction().pattern of the tangent last assembled, plus `shift` times the mean size
+  /// of their diagonal.
+  const Vector& reduced_tangent(double shift = 0.0);
   /// CSR values on pattern() of the tangent last assembled; of symmetric kinds made when asked for.
   const Vector& full_tangent();
 
@@ -86,6 +94,9 @@ class System {
   FactorStatus factorise(double shift = 0.0);
   /// The same without asking it to be positive definite (symmetric kinds only).
   FactorStatus factorise_indefinite();
+  /// Flops and entries of a Cholesky factor of the reduced tangent, as its analysis counts them;
+  /// the analysis is kept.
+  std::pair<double, double> predicted_factor();
   /// Make ready to solve with the reduced tangent last assembled, if need be on the factor of an
   /// earlier one (Method::Kept); else as factorise() does.
   FactorStatus prepare();
@@ -102,14 +113,16 @@ class System {
   Vector along_arcs(const ConstVector& u, const ConstVector& d);
   /// Signs of the eigenvalues of the reduced tangent last assembled (symmetric kinds only); of a
   /// quasi-definite one those of its last factor.
+  /// With Method::Grid only whether one is negative: 1, or 0.
   Inertia inertia();
 
   mutable Timings timings; ///< of what only asks, too
 
  private:
   bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
-  bool keeps() const { return method_ == Method::Kept && kind() == Kind::Cholesky; }
+  bool keeps() const { return method_ != Method::Direct && kind() == Kind::Cholesky; }
   FactorStatus prepare_inverse();
+  SymmetricSolver& symmetric();
   const NodeRotations& rotations();
   void solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x);
   void count_work();
@@ -134,6 +147,8 @@ class System {
   std::unique_ptr<NodeRotations> rotations_; // outlives symmetric_
   std::unique_ptr<SymmetricSolver> symmetric_;
   Method method_ = Method::Direct;
+  Corners corners_;
+  Aggregate aggregate_;
   Vector lower_values_, values_, reduced_;
   Vector at_;                 // u of the tangent last assembled
   double load_factor_ = 0.0;  // and its loads
