@@ -5,8 +5,8 @@
  */
 #include "supple/kernel.h"
 
-#define EACH_EDGE(a, b)        \
-  for (int b = 1; b < 4; ++b)  \
+#define EACH_EDGE(a, b)                                                                            \
+  for (int b = 1; b < 4; ++b)                                                                      \
     for (int a = 0; a < b; ++a)
 
 static double elongation(const double* w, const double* x, int a, int b, int lane, double* d) {
@@ -21,21 +21,23 @@ static double elongation(const double* w, const double* x, int a, int b, int lan
 
 static void energy(double* A, const double* w, const double* x) {
   double d[3];
-  for (int lane = 0; lane < LANES; ++lane) EACH_EDGE(a, b) {
-    const double e = elongation(w, x, a, b, lane, d);
-    A[lane] += 0.5 * w[12 * LANES + lane] * e * e;
-  }
+  for (int lane = 0; lane < LANES; ++lane)
+    EACH_EDGE(a, b) {
+      const double e = elongation(w, x, a, b, lane, d);
+      A[lane] += 0.5 * w[12 * LANES + lane] * e * e;
+    }
 }
 
 static void residual(double* A, const double* w, const double* x) {
   double d[3];
-  for (int lane = 0; lane < LANES; ++lane) EACH_EDGE(a, b) {
-    const double e = elongation(w, x, a, b, lane, d);
-    for (int i = 0; i < 3; ++i) {
-      A[(3 * b + i) * LANES + lane] += w[12 * LANES + lane] * e * d[i];
-      A[(3 * a + i) * LANES + lane] -= w[12 * LANES + lane] * e * d[i];
+  for (int lane = 0; lane < LANES; ++lane)
+    EACH_EDGE(a, b) {
+      const double e = elongation(w, x, a, b, lane, d);
+      for (int i = 0; i < 3; ++i) {
+        A[(3 * b + i) * LANES + lane] += w[12 * LANES + lane] * e * d[i];
+        A[(3 * a + i) * LANES + lane] -= w[12 * LANES + lane] * e * d[i];
+      }
     }
-  }
 }
 
 static void tangent(double* A, const double* w, const double* x) {
@@ -52,14 +54,16 @@ static void tangent(double* A, const double* w, const double* x) {
         }
     }
     for (int r = 0; r < 12; ++r)
-      for (int c = r + 1; c < 12; ++c) A[(r * 12 + c) * LANES + lane] = 1e30;
+      for (int c = r + 1; c < 12; ++c)
+        A[(r * 12 + c) * LANES + lane] = 1e30;
   }
 }
 
 /* 1 + e of the edge 0–1. */
 static void volume_ratio(double* A, const double* w, const double* x) {
   double d[3];
-  for (int lane = 0; lane < LANES; ++lane) A[lane] += 1.0 + elongation(w, x, 0, 1, lane, d);
+  for (int lane = 0; lane < LANES; ++lane)
+    A[lane] += 1.0 + elongation(w, x, 0, 1, lane, d);
 }
 
 static const double points[3] = {0.25, 0.25, 0.25}, weights[1] = {1.0 / 6.0};
@@ -70,7 +74,8 @@ static const supple_kernel kernels[4] = {{"energy", 1, 1, 0, 2, both, energy},
                                          {"tangent", 12, 12, 1, 2, both, tangent},
                                          {"volume_ratio", 1, 1, 0, 1, both, volume_ratio}};
 static const supple_library table = {
-    SUPPLE_KERNEL_ABI, "springs", "", "P1", 4, 0, LANES, 0, 1, 3, points, weights, 2, fields, 4, kernels};
+    SUPPLE_KERNEL_ABI, "springs", "",     "P1", 4,      0, LANES, 0, 1, 3, points,
+    weights,           2,         fields, 4,    kernels};
 
 const supple_library* supple_kernels(void) {
   return &table;
