@@ -136,7 +136,8 @@ class Solver:
                 state = body.solve(start, **settings)
             except SuppleError:  # too far away: from zero it has its own way
                 state = None
-        state = state or body.solve(**settings)
+        if state is None:
+            state = body.solve(**settings)
         self._solved.keep(x, state)
         return state
 
