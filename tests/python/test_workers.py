@@ -17,10 +17,11 @@ from supple.workers import Lost, Workers
 
 #: Asks two workers for a nap; says their process ids first.
 NAPS = """
-import functools
+import functools, signal
 from supple.workers import Workers
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's "&" turns off
     with Workers(2, functools.partial, eval) as pool:
         for _, pid in pool.answers(["__import__('os').getpid()"] * 2):
             print(pid, flush=True)
@@ -103,11 +104,15 @@ def test_no_worker_outlives_its_caller(tmp_path: Path, sign: signal.Signals) -> 
         text=True, start_new_session=True,
     )  # fmt: skip
     assert caller.stdout is not None
-    pids = [int(caller.stdout.readline()) for _ in range(2)]
-    time.sleep(0.2)
-    send = os.killpg if sign == signal.SIGINT else os.kill
-    send(caller.pid, sign)
-    _, said = caller.communicate(timeout=20)
+    with caller:
+        pids = [int(caller.stdout.readline()) for _ in range(2)]
+        time.sleep(0.2)
+        send = os.killpg if sign == signal.SIGINT else os.kill
+        send(caller.pid, sign)
+        try:
+            _, said = caller.communicate(timeout=60)
+        finally:
+            caller.kill()
     assert caller.returncode == -sign
     if sign == signal.SIGINT:
         assert said.count("Traceback") == 1, said
