@@ -16,10 +16,11 @@
     parts       a long kernel as several functions
     fingerprint the mark by which a library is known to be of this generator
     simd/       FFCx's graph as C on vectors of cells
+    targets     processors that kernels are compiled ahead for
     generate    unit → C source with its kernel table
     build       C source → shared library, kept in the user's cache
     ahead       the units that CMake compiles
 
-Only `reader`, `unit`, `cells`, `degree`, `fingerprint` and `build` are needed to find a library
-that exists: they import neither UFL nor FFCx.
+Only `reader`, `unit`, `cells`, `degree`, `fingerprint`, `targets` and `build` are needed to find a
+library that exists: they import neither UFL nor FFCx.
 """

@@ -92,6 +92,7 @@ def gradients(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     return np.where(abs(values - near) < 1e-14, near, values), weights
 
 
+@cache
 def quadrature(name: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (q, tdim) and weights (q,) on the reference cell; ``degree`` may name its scheme.
 

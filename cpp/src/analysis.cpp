@@ -2,7 +2,7 @@
 #include <mutex>
 #include <utility>
 
-#include "cholmod_library.hpp"
+#include "group_orders.hpp"
 #include "symbolic.hpp"
 
 namespace supple {

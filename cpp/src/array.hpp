@@ -9,11 +9,12 @@
 #include <memory>
 
 #include "supple/error.hpp"
+#include "supple/kernel.h"
 
 namespace supple {
 
-/// Large arrays of numbers, aligned to 64 bytes, that need no first value, and whose pages are kept
-/// from one use to the next.
+/// Large arrays of numbers, aligned as kernels want it, that need no first value, and whose pages
+/// are kept from one use to the next.
 template <class T>
 class ArrayOf {
  public:
@@ -28,9 +29,7 @@ class ArrayOf {
       const std::size_t whole = (bytes / align + 1) * align;
       values_.reset(static_cast<T*>(std::aligned_alloc(align, whole)));
       if (align == kHugePage && values_) madvise(values_.get(), whole, MADV_HUGEPAGE);
-      if (!values_)
-        throw NumericalError(
-            "the factorisation ran out of memory; use a coarser mesh or a lower order");
+      if (!values_) throw NumericalError("out of memory; use a coarser mesh or a lower order");
       size_ = size;
     }
     return values_.get();
@@ -38,7 +37,7 @@ class ArrayOf {
   T* get() const { return values_.get(); }
 
  private:
-  static constexpr std::size_t kAlign = 64, kHugePage = 1 << 21;
+  static constexpr std::size_t kAlign = SUPPLE_ALIGNMENT, kHugePage = 1 << 21;
   struct Free {
     void operator()(T* values) const { std::free(values); }
   };

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "array.hpp"
+#include "front_vectors.hpp"
 #include "linear_backend.hpp"
 #include "strips.hpp"
 #include "supernodal_tree.hpp"
@@ -41,7 +42,7 @@ class Cholesky final : public Backend {
     pattern_ = &pattern;
     const int threads = omp_get_max_threads();
     analysis_ = shared_tree(pattern, threads > 1 ? kBranches * threads : 1, S);
-    lay_vectors();
+    lay_out();
   }
 
   FactorStatus factorise(double* values) override {
@@ -62,18 +63,18 @@ class Cholesky final : public Backend {
       const std::vector<Index>& trunk = tree().trunk;
       worker.share(branches, [&](int b) {
         for (Index s = tree().branch[at(b)].begin; s < tree().branch[at(b)].end; ++s)
-          forward(s, rhs, 1.0 / largest);
+          vectors_.forward(s, factor_.get(), rhs, 1.0 / largest);
       });
       // By one thread: fronts to share out would cost more waiting than there is to read.
       worker.once([&] {
         for (const Index s : trunk)
-          forward(s, rhs, 1.0 / largest);
+          vectors_.forward(s, factor_.get(), rhs, 1.0 / largest);
         for (auto s = trunk.rbegin(); s != trunk.rend(); ++s)
-          backward(*s, x, scale_ * largest, 0);
+          vectors_.backward(*s, factor_.get(), x, scale_ * largest, 0);
       });
       worker.share(branches, [&](int b) {
         for (Index s = tree().branch[at(b)].end; s-- > tree().branch[at(b)].begin;)
-          backward(s, x, scale_ * largest, worker.number);
+          vectors_.backward(s, factor_.get(), x, scale_ * largest, worker.number);
       });
     });
   }
@@ -88,32 +89,20 @@ class Cholesky final : public Backend {
  private:
   const SupernodeTree& tree() const { return analysis_->tree; }
   const Supernode& node(Index s) const { return tree().node[at(s)]; }
-  /// Strips of the diagonal block and of the rows below it.
-  Index wide(const Supernode& node) const { return strips::whole(node.columns, S); }
-  Index tall(const Supernode& node) const { return strips::whole(node.below, S); }
+  Index wide(const Supernode& node) const { return layout_.wide(node); }
+  Index tall(const Supernode& node) const { return layout_.tall(node); }
   T* panel(const Supernode& node) const { return factor_.get() + node.panel; }
   T* update(const Supernode& node) const { return updates_.get() + node.update; }
-  const Index* places(const Supernode& node) const { return tree().place.data() + node.rows; }
 
-  /// Where each supernode has its part of x and of what it owes to the rows below.
-  void lay_vectors() {
-    start_.clear();
-    std::int64_t end = 0;
-    tallest_ = widest_ = 0;
-    for (Index s = 0; s < tree().size(); ++s) {
-      start_.push_back(end);
-      end += (wide(node(s)) + tall(node(s))) * static_cast<std::int64_t>(S);
+  void lay_out() {
+    layout_ = {&tree(), S};
+    tallest_ = 0;
+    for (Index s = 0; s < tree().size(); ++s)
       tallest_ = std::max(tallest_, tall(node(s)) * S);
-      widest_ = std::max(widest_, wide(node(s)) * S);
-    }
-    vector_.sized(end);
-    const auto threads = at(std::max(omp_get_max_threads(), 1));
-    work_.resize(threads);
-    offset_.resize(threads);
-    for (ArrayOf<T>& work : work_)
-      work.sized(static_cast<std::int64_t>(widest_) * S);
+    offset_.resize(at(std::max(omp_get_max_threads(), 1)));
     for (auto& offset : offset_)
       offset.resize(at(4) * at(tallest_));
+    vectors_.lay(layout_, offset_.size());
   }
 
   /// Powers of two keep the numbers inside the range of a float.
@@ -136,11 +125,11 @@ class Cholesky final : public Backend {
   /// Run `use` by all threads, or by this one where they are not worth their waking.
   template <class Use>
   void together(bool worth, const Use& use) {
-    const bool many = worth && work_.size() > 1 && !omp_in_parallel();
+    const bool many = worth && offset_.size() > 1 && !omp_in_parallel();
     Worker alone;
     if (!many) return use(alone);
     team_.reset();
-#pragma omp parallel num_threads(static_cast<int>(work_.size()))
+#pragma omp parallel num_threads(static_cast<int>(offset_.size()))
     {
       Worker worker{omp_get_thread_num(), &team_};
       use(worker);
@@ -164,7 +153,7 @@ class Cholesky final : public Backend {
   void front(Index s, Worker& worker) {
     const Supernode& f = node(s);
     worker.once([&] { start_panel(s); });
-    for_children(s, [&](const Supernode& child) { add(child, f, true, worker); });
+    layout_.for_children(s, [&](Index child) { add(node(child), f, true, worker); });
     for (Index j = 0; j < f.columns; j += kPanel)
       if (!eliminate(f, {j, std::min(j + kPanel, f.columns)}, worker)) return;
     if (f.below == 0) return;
@@ -172,7 +161,7 @@ class Cholesky final : public Backend {
     // The longest rows first: what is left for the end is short.
     share_strips(worker, {0, tall(f)}, true,
                  [&](Run strips) { kernels_.outer(update(f), below, f.columns, strips); });
-    for_children(s, [&](const Supernode& child) { add(child, f, false, worker); });
+    layout_.for_children(s, [&](Index child) { add(node(child), f, false, worker); });
   }
 
   void start_panel(Index s) {
@@ -209,7 +198,7 @@ class Cholesky final : public Backend {
 
   /// Add what a child leaves to the panel of its parent's front, or to its update.
   void add(const Supernode& child, const Supernode& f, bool to_panel, Worker& worker) {
-    const Index* const place = places(child);
+    const Index* const place = layout_.places(child);
     const auto m = child.below;
     const auto inside = static_cast<Index>(std::lower_bound(place, place + m, f.columns) - place);
     if (to_panel ? inside == 0 : inside == m) return;
@@ -248,69 +237,16 @@ class Cholesky final : public Backend {
     });
   }
 
-  template <class Use>
-  void for_children(Index s, Use use) const {
-    for (Index c = tree().child_start[at(s)]; c < tree().child_start[at(s) + 1]; ++c)
-      use(node(tree().child[at(c)]));
-  }
-
-  T* part(Index s) const { return vector_.get() + start_[at(s)]; }
-
-  void forward(Index s, const double* rhs, double scale) {
-    const Supernode& f = node(s);
-    T* const x = part(s);
-    gather_right_hand_side(s, rhs, scale);
-    kernels_.forward(panel(f), f.columns, tall(f), x, x + wide(f) * S);
-  }
-
-  void gather_right_hand_side(Index s, const double* rhs, double scale) {
-    const Supernode& f = node(s);
-    T* const x = part(s);
-    T* const below = x + wide(f) * S;
-    std::fill(x, below + tall(f) * S, T(0));
-    for (Index j = 0; j < f.columns; ++j)
-      x[j] = static_cast<T>(rhs[tree().order[at(f.first + j)]] * scale);
-    for (Index c = tree().child_start[at(s)]; c < tree().child_start[at(s) + 1]; ++c) {
-      const Index child = tree().child[at(c)];
-      const Index* const place = places(node(child));
-      const T* const from = part(child) + wide(node(child)) * S;
-      for (Index i = 0; i < node(child).below; ++i)
-        (place[i] < f.columns ? x[place[i]] : below[place[i] - f.columns]) += from[i];
-    }
-  }
-
-  void backward(Index s, double* result, double scale, int thread) {
-    const Supernode& f = node(s);
-    T* const x = part(s);
-    gather_solution(s);
-    kernels_.backward(panel(f), f.columns, tall(f), x, x + wide(f) * S, work_[at(thread)].get());
-    for (Index j = 0; j < f.columns; ++j)
-      result[tree().order[at(f.first + j)]] = static_cast<double>(x[j]) * scale;
-  }
-
-  /// The entries of x that the rows below stand for, from the parent, which has them all.
-  void gather_solution(Index s) {
-    const Supernode& f = node(s);
-    if (f.parent < 0) return;
-    const Supernode& parent = node(f.parent);
-    const T* const from = part(f.parent);
-    T* const below = part(s) + wide(f) * S;
-    const Index shift = wide(parent) * S - parent.columns;
-    const Index* const place = places(f);
-    for (Index i = 0; i < f.below; ++i)
-      below[i] = from[place[i] < parent.columns ? place[i] : place[i] + shift];
-  }
-
   const strips::Kernels<T>& kernels_ = strips::kernels<T>();
   const Index S = kernels_.lanes;
   const CscPattern* pattern_ = nullptr;
   const double* values_ = nullptr;
   double scale_ = 1.0; // of the matrix
   std::shared_ptr<const TreeReport> analysis_;
-  ArrayOf<T> factor_, updates_, vector_;
-  std::vector<std::int64_t> start_;                // of each supernode in vector_
-  Index tallest_ = 0, widest_ = 0;                 // rows below, and columns, in whole strips
-  std::vector<ArrayOf<T>> work_;                   // of each thread
+  FrontLayout layout_;
+  ArrayOf<T> factor_, updates_;
+  FrontVectors<T> vectors_;
+  Index tallest_ = 0;                              // rows below, in whole strips
   std::vector<std::vector<std::uint32_t>> offset_; // of each thread
   Team team_;
   std::atomic<Index> failed_{0}; // the first column without a positive pivot

@@ -27,7 +27,6 @@ class Backend {
   virtual const char* ordering() const = 0;
 };
 
-std::unique_ptr<Backend> make_cholmod(Kind kind);
 std::unique_ptr<Backend> make_umfpack();
 std::unique_ptr<Backend> make_supernodal(Kind kind);
 std::unique_ptr<Backend> make_cholesky(Precision precision);

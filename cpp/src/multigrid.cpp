@@ -12,7 +12,7 @@ namespace supple {
 namespace {
 
 constexpr Index kCoarsest = 400;      // block rows that a direct factor takes
-constexpr int kUpdate = 13;            // iterations that cost as much as an update: measured
+constexpr int kUpdate = 13;           // iterations that cost as much as an update: measured
 constexpr double kLeastShrink = 0.75; // of the block rows from level to level, else it is coarsest
 
 struct Level {

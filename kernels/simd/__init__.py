@@ -12,6 +12,15 @@
     lanes        how many cells a call, and the C that every such kernel begins with
     *.h          vector functions
 
+Which kernel is made how, the first that fits (generate._Compiler):
+
+    tangent of a solid's inverse form     solid and point_law, where ψ looks at F alone
+    other tangents by gradients alone     gradients and linear: direct, mean dilatation, and the
+                                          inverse of a law that looks at the cell's edges
+    all other forms                       body and contraction, the arguments factored by FFCx:
+                                          mixed, skins, pressures; every residual and energy
+    values at points                      body
+
 A vector is `vec`, LANES doubles (vector extensions of GCC and Clang); a truth is a `mask` of LANES
 integers, all bits or none; conditions choose lane by lane, so no lane ever sees another's numbers.
 What is the same for all cells stays a double.
