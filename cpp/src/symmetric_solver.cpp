@@ -67,7 +67,7 @@ FactorStatus SymmetricSolver::renew() {
   worn_ = false;
   turned_ = turn_;
   spread_ = 1.0;
-  if (status.ok() && kept_->exact()) definite_ = Definite::Yes;
+  if (status.ok() && kept_->proves()) definite_ = Definite::Yes;
   if (status.cause == FactorStatus::Cause::NotPositiveDefinite) definite_ = Definite::No;
   return status;
 }
@@ -92,7 +92,7 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   work.iterations += report.iterations;
   if (report.spread != 0.0) spread_ = report.spread;
   if (fresh_) rate(report);
-  worn_ = !fresh_ && excess(report) > saved;
+  worn_ = excess(report) > saved && (!fresh_ || (kept_->exact() && kept_->sharpen()));
   if (report.definite != Definite::Unknown && definite_ == Definite::Unknown)
     definite_ = report.definite;
   return report;
@@ -129,12 +129,10 @@ FactorStatus SymmetricSolver::solve(const Vector& rhs, double tolerance, bool pr
     const FactorStatus status = renew(); // which tells, too, and serves the next solves
     if (!status.ok()) return status;
   }
-  bool good = iterate(rhs, tolerance, probe, x).converged;
-  if (!good && !fresh_) {
+  while (!iterate(rhs, tolerance, probe, x).converged && (!fresh_ || worn_)) {
     const FactorStatus status = renew();
     if (!status.ok()) return status;
     x.setZero();
-    iterate(rhs, tolerance, probe, x);
   }
   return x.allFinite() ? FactorStatus{} : FactorStatus{FactorStatus::Cause::Singular, -1};
 }
