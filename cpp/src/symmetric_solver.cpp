@@ -49,11 +49,19 @@ FactorStatus SymmetricSolver::prepare(const Vector& values, const ConstVector& u
 FactorStatus SymmetricSolver::prove(const Vector& values, const ConstVector& u) {
   take(values, u);
   const FactorStatus status = renew();
-  if (!status.ok() || definite_ != Definite::Unknown) return status;
-  Vector x = Vector::Zero(pattern_.size);
-  iterate(Vector::Ones(x.size()), 1.0, true, x);
+  if (!status.ok()) return status;
+  find_definite();
   if (definite_ == Definite::No) return {FactorStatus::Cause::NotPositiveDefinite, -1};
   return status;
+}
+
+void SymmetricSolver::find_definite() {
+  if (!usable_ || definite_ != Definite::Unknown) return;
+  const bool cheap = cheap_to_probe(static_cast<double>(pattern_.size));
+  if (!cheap && !fresh_) renew();
+  if (!usable_ || definite_ != Definite::Unknown) return;
+  Vector x = Vector::Zero(pattern_.size);
+  iterate(Vector::Ones(x.size()), 1.0, true, x);
 }
 
 FactorStatus SymmetricSolver::renew() {
@@ -125,7 +133,8 @@ bool SymmetricSolver::cheap_to_probe(double size) const {
 FactorStatus SymmetricSolver::solve(const Vector& rhs, double tolerance, bool probe, Vector& x) {
   x.setZero(rhs.size());
   if (!usable_) return {FactorStatus::Cause::Singular, -1};
-  if (probe && definite_ == Definite::Unknown && !cheap_to_probe(static_cast<double>(rhs.size()))) {
+  const bool unsure = probe && definite_ == Definite::Unknown && !fresh_;
+  if (unsure && !cheap_to_probe(static_cast<double>(rhs.size()))) {
     const FactorStatus status = renew(); // which tells, too, and serves the next solves
     if (!status.ok()) return status;
   }

@@ -300,6 +300,15 @@ Definite System::definite() const {
   return current_ == nullptr && symmetric_ ? symmetric_->definite() : definite_;
 }
 
+Definite System::find_definite() {
+  if (definite() == Definite::Unknown && current_ == nullptr && symmetric_) {
+    symmetric_->find_definite();
+    count_kept();
+  }
+  if (definite() == Definite::Unknown) factorise();
+  return definite();
+}
+
 /// By conjugate gradients; by LDLᵀ where those led to a new factor that the tangent does not have.
 void System::solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x) {
   const FactorStatus status = symmetric_->solve(rhs, tolerance, probe, x);

@@ -109,6 +109,9 @@ class System {
   Vector solve(const ConstVector& rhs, double tolerance = 1e-10, bool probe = false);
   /// What is known of the signs of the eigenvalues of the tangent last prepared or factorised.
   Definite definite() const;
+  /// The same, but find out where it is unknown: by iterations or by a factor, whichever costs
+  /// less.
+  Definite find_definite();
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
   /// The step d (dofs) from `u`, its free nodes on arcs: NodeRotations::along_arcs.
