@@ -184,6 +184,7 @@ void bind_system(py::module_& module) {
       .def_readonly("krylov_iterations", &supple::Timings::krylov_iterations);
   py::enum_<supple::Method>(module, "Method")
       .value("direct", supple::Method::Direct)
+      .value("pardiso", supple::Method::Pardiso)
       .value("cg", supple::Method::Kept)
       .value("multigrid", supple::Method::Grid);
   py::class_<System>(module, "System")

@@ -35,9 +35,10 @@ class RitzValues {
                                   Eigen::Map<const Vector>(beside_.data(), k - 1),
                                   Eigen::EigenvaluesOnly);
     report.spread = solver.eigenvalues()[0] / solver.eigenvalues()[k - 1];
+    const int enough = probe_iterations(report.spread, static_cast<double>(n));
     if (!(report.spread > 0.0)) {
       report.definite = Definite::No;
-    } else if (k >= kFewest && k >= probe_iterations(report.spread, static_cast<double>(n))) {
+    } else if (k >= kFewest && k >= enough) {
       report.definite = Definite::Yes;
     }
   }
@@ -64,9 +65,11 @@ Vector noise(Eigen::Index size) {
 
 int probe_iterations(double spread, double size) {
   if (!(spread > 0.0)) return std::numeric_limits<int>::max();
-  const double digits = std::log(1.648 * std::sqrt(size) / kMissed);
-  const double count = 0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0);
-  return static_cast<int>(std::min(count + 1.0, 1e9));
+  const double digits = std::log(2.0 * 1.648 * std::sqrt(size) / kMissed);
+  const double whole = 0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0);
+  const double away = std::max((1.0 - spread) / (1.0 + spread), kNoCurve); // from their middle
+  const double close = 1.0 + digits / -std::log(away);
+  return static_cast<int>(std::min({whole + 1.0, close + 1.0, 1e9}));
 }
 
 CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditioner,

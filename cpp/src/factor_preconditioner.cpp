@@ -5,14 +5,18 @@
 namespace supple {
 namespace {
 
-constexpr double kFactorRate = 0.05; // times flops over entries of L: measured at 10,000 dofs
+constexpr double kFactorRate = 0.03; // times flops over entries of L: measured at 10,000 dofs
 constexpr int kLeastSaved = 8, kMostSaved = 40; // small ones cost calls, large ones run faster
 
 class FactorPreconditioner final : public Preconditioner {
  public:
   FactorStatus update(const CscPattern& pattern, const Vector& values) override {
+    if (factor_.precision() != precision_) factor_ = Factor(Kind::Cholesky, precision_);
     if (factor_.size() == 0) factor_.analyse(pattern);
-    return factor_.factorise(values);
+    const FactorStatus status = factor_.factorise(values);
+    // A matrix beyond the reach of single precision: those after it will be so, too.
+    if (status.ok() && factor_.fell_back()) precision_ = Precision::Double;
+    return status;
   }
 
   void apply(const Vector& r, Vector& z) override { factor_.apply_inverse(r, z); }
@@ -22,10 +26,23 @@ class FactorPreconditioner final : public Preconditioner {
     return std::clamp(static_cast<int>(count), kLeastSaved, kMostSaved);
   }
 
-  double bytes() const override { return sizeof(double) * factor_.nonzeros(); }
+  bool proves() const override {
+    return factor_.precision() == Precision::Double || factor_.fell_back();
+  }
+
+  bool sharpen() override {
+    if (proves()) return false;
+    precision_ = Precision::Double;
+    return true;
+  }
+
+  double bytes() const override {
+    return (proves() ? sizeof(double) : sizeof(float)) * factor_.nonzeros();
+  }
 
  private:
-  Factor factor_{Kind::Cholesky};
+  Precision precision_ = Precision::Single; // of the next update
+  Factor factor_{Kind::Cholesky, precision_};
 };
 
 } // namespace

@@ -138,8 +138,7 @@ bool LoadStep::settled(Vector& u, Vector& r, double norm, double step, double s)
 Outcome LoadStep::stable(const Vector& u) {
   if (!p_.has_energy) return Outcome::Converged;
   if (p_.minimises && shift_ == 0.0) { // what K was one step ago
-    if (p_.system.definite() == Definite::Unknown) p_.system.factorise();
-    if (p_.system.definite() == Definite::Yes) return Outcome::Converged;
+    if (p_.system.find_definite() == Definite::Yes) return Outcome::Converged;
   }
   p_.result.negative =
       p_.minimises ? unstable_directions(p_.system, u) : unstable_directions_of_saddle(p_.system);

@@ -6,8 +6,30 @@ namespace supple {
 namespace {
 
 constexpr int kMostSteps = 20;
-constexpr double kStraight = 1e-6; // angle below which an arc is none
+constexpr std::ptrdiff_t kWorthThreads = 10'000; // nodes
+constexpr double kStraight = 1e-6;               // angle below which an arc is none
 constexpr double kNear = 1e-6; // more is not needed of a preconditioner, it only must stay regular
+
+/// Σ b aᵀ about the means of n vectors, from the sums.
+class Mixed {
+ public:
+  void add(const double* a, const double* b) {
+    for (int j = 0; j < 3; ++j) {
+      a_[j] += a[j];
+      b_[j] += b[j];
+      for (int i = 0; i < 3; ++i)
+        product_[3 * j + i] += b[i] * a[j];
+    }
+  }
+  Eigen::Matrix3d about_means(Index n) const {
+    using Three = Eigen::Map<const Eigen::Vector3d>;
+    return Eigen::Map<const Eigen::Matrix3d>(product_) -
+           Three(b_) * Three(a_).transpose() / static_cast<double>(n);
+  }
+
+ private:
+  double product_[9] = {}, a_[3] = {}, b_[3] = {};
+};
 
 /// Orthogonal polar factor by Newton's iteration with scaling; the identity where there is none.
 /// Source: Higham (1986), SIAM J. Sci. Stat. Comput. 7(4), §3.
@@ -61,12 +83,26 @@ NodeRotations::Moments NodeRotations::moments(Index node, PlaceA place_a, PlaceB
 }
 
 NodeRotations::Rotations NodeRotations::at(const ConstVector& u) const {
-  const auto rest = [&](Index a) -> Eigen::Vector3d { return points_->segment<3>(3 * a); };
-  const auto moved = [&](Index a) -> Eigen::Vector3d { return rest(a) + u.segment<3>(3 * a); };
-  Rotations result;
-  result.reserve(nodes_.size());
-  for (const Node& n : nodes_)
-    result.push_back(polar(moments(n.node, rest, moved).mixed));
+  const double *const rest = points_->data(), *const way = u.data();
+  Rotations result(nodes_.size());
+  const auto count = static_cast<std::ptrdiff_t>(nodes_.size());
+#pragma omp parallel for if (count > kWorthThreads)
+  for (std::ptrdiff_t k = 0; k < count; ++k) {
+    const Index node = nodes_[static_cast<std::size_t>(k)].node;
+    const double *const a0 = rest + 3 * node, *const d0 = way + 3 * node;
+    Mixed sum;
+    Index neighbours = 0;
+    for (Index e = graph_->node_start[static_cast<std::size_t>(node)];
+         e < graph_->node_start[static_cast<std::size_t>(node) + 1]; ++e, ++neighbours) {
+      const Index other = graph_->neighbour[static_cast<std::size_t>(e)];
+      if (other >= graph_->nodes) break; // scalars come last
+      const double *const a1 = rest + 3 * other, *const d1 = way + 3 * other;
+      const double a[3] = {a1[0] - a0[0], a1[1] - a0[1], a1[2] - a0[2]};
+      const double b[3] = {a[0] + d1[0] - d0[0], a[1] + d1[1] - d0[1], a[2] + d1[2] - d0[2]};
+      sum.add(a, b);
+    }
+    result[static_cast<std::size_t>(k)] = polar(sum.about_means(neighbours));
+  }
   return result;
 }
 

@@ -49,11 +49,19 @@ FactorStatus SymmetricSolver::prepare(const Vector& values, const ConstVector& u
 FactorStatus SymmetricSolver::prove(const Vector& values, const ConstVector& u) {
   take(values, u);
   const FactorStatus status = renew();
-  if (!status.ok() || definite_ != Definite::Unknown) return status;
-  Vector x = Vector::Zero(pattern_.size);
-  iterate(Vector::Ones(x.size()), 1.0, true, x);
+  if (!status.ok()) return status;
+  find_definite();
   if (definite_ == Definite::No) return {FactorStatus::Cause::NotPositiveDefinite, -1};
   return status;
+}
+
+void SymmetricSolver::find_definite() {
+  if (!usable_ || definite_ != Definite::Unknown) return;
+  const bool cheap = cheap_to_probe(static_cast<double>(pattern_.size));
+  if (!cheap && !fresh_) renew();
+  if (!usable_ || definite_ != Definite::Unknown) return;
+  Vector x = Vector::Zero(pattern_.size);
+  iterate(Vector::Ones(x.size()), 1.0, true, x);
 }
 
 FactorStatus SymmetricSolver::renew() {
@@ -67,7 +75,7 @@ FactorStatus SymmetricSolver::renew() {
   worn_ = false;
   turned_ = turn_;
   spread_ = 1.0;
-  if (status.ok() && kept_->exact()) definite_ = Definite::Yes;
+  if (status.ok() && kept_->proves()) definite_ = Definite::Yes;
   if (status.cause == FactorStatus::Cause::NotPositiveDefinite) definite_ = Definite::No;
   return status;
 }
@@ -92,7 +100,7 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   work.iterations += report.iterations;
   if (report.spread != 0.0) spread_ = report.spread;
   if (fresh_) rate(report);
-  worn_ = !fresh_ && excess(report) > saved;
+  worn_ = excess(report) > saved && (!fresh_ || (kept_->exact() && kept_->sharpen()));
   if (report.definite != Definite::Unknown && definite_ == Definite::Unknown)
     definite_ = report.definite;
   return report;
@@ -125,16 +133,15 @@ bool SymmetricSolver::cheap_to_probe(double size) const {
 FactorStatus SymmetricSolver::solve(const Vector& rhs, double tolerance, bool probe, Vector& x) {
   x.setZero(rhs.size());
   if (!usable_) return {FactorStatus::Cause::Singular, -1};
-  if (probe && definite_ == Definite::Unknown && !cheap_to_probe(static_cast<double>(rhs.size()))) {
+  const bool unsure = probe && definite_ == Definite::Unknown && !fresh_;
+  if (unsure && !cheap_to_probe(static_cast<double>(rhs.size()))) {
     const FactorStatus status = renew(); // which tells, too, and serves the next solves
     if (!status.ok()) return status;
   }
-  bool good = iterate(rhs, tolerance, probe, x).converged;
-  if (!good && !fresh_) {
+  while (!iterate(rhs, tolerance, probe, x).converged && (!fresh_ || worn_)) {
     const FactorStatus status = renew();
     if (!status.ok()) return status;
     x.setZero();
-    iterate(rhs, tolerance, probe, x);
   }
   return x.allFinite() ? FactorStatus{} : FactorStatus{FactorStatus::Cause::Singular, -1};
 }

@@ -5,6 +5,7 @@
 #include "node_rotations.hpp"
 #include "stopwatch.hpp"
 #include "supple/error.hpp"
+#include "supple/pardiso.hpp"
 
 namespace supple {
 
@@ -37,7 +38,24 @@ void System::forget_factors() {
 }
 
 void System::use_method(Method method) {
+  if (method == Method::Pardiso && !pardiso_loaded())
+    throw StateError("Method::Pardiso needs MKL; call load_pardiso first");
+  if ((method == Method::Pardiso) != (method_ == Method::Pardiso)) {
+    factor_.reset();
+    indefinite_.reset();
+    current_ = nullptr;
+  }
   method_ = method;
+}
+
+/// A factor of the reduced tangent, ready for its values.
+std::unique_ptr<Factor> System::analysed(Kind kind) {
+  const Reduction& r = reduction();
+  const Stopwatch watch(timings.analysis);
+  const Library library = method_ == Method::Pardiso ? Library::Pardiso : Library::Own;
+  auto factor = std::make_unique<Factor>(kind, Precision::Double, library);
+  factor->analyse(r.pattern);
+  return factor;
 }
 
 void System::use_grid(Corners corners, Aggregate aggregate) {
@@ -224,28 +242,18 @@ const Vector& System::reduced_tangent(double shift) {
 }
 
 std::pair<double, double> System::predicted_factor() {
-  if (!factor_) {
-    const Reduction& r = reduction();
-    const Stopwatch watch(timings.analysis);
-    factor_ = std::make_unique<Factor>(kind());
-    factor_->analyse(r.pattern);
-  }
+  if (!factor_) factor_ = analysed(kind());
   return {factor_->flops(), factor_->nonzeros()};
 }
 
 FactorStatus System::factorise(double shift) {
-  const Reduction& r = reduction();
   if (iterates()) return prepare_inverse();
   if (has_grid()) {
     const FactorStatus status = symmetric().prove(reduced_tangent(shift), at_);
     count_kept();
     return status;
   }
-  if (!factor_) {
-    const Stopwatch analysing(timings.analysis);
-    factor_ = std::make_unique<Factor>(kind());
-    factor_->analyse(r.pattern);
-  }
+  if (!factor_) factor_ = analysed(kind());
   const Stopwatch watch(timings.factor);
   const Vector& values = reduced_tangent(shift);
   current_ = factor_.get();
@@ -292,6 +300,15 @@ Definite System::definite() const {
   return current_ == nullptr && symmetric_ ? symmetric_->definite() : definite_;
 }
 
+Definite System::find_definite() {
+  if (definite() == Definite::Unknown && current_ == nullptr && symmetric_) {
+    symmetric_->find_definite();
+    count_kept();
+  }
+  if (definite() == Definite::Unknown) factorise();
+  return definite();
+}
+
 /// By conjugate gradients; by LDLᵀ where those led to a new factor that the tangent does not have.
 void System::solve_kept(const Vector& rhs, double tolerance, bool probe, Vector& x) {
   const FactorStatus status = symmetric_->solve(rhs, tolerance, probe, x);
@@ -332,12 +349,7 @@ void System::count_work() {
 
 FactorStatus System::factorise_indefinite() {
   if (has_grid()) return {FactorStatus::Cause::NotPositiveDefinite, -1}; // it has no such factor
-  const Reduction& r = reduction();
-  if (!indefinite_) {
-    const Stopwatch analysing(timings.analysis);
-    indefinite_ = std::make_unique<Factor>(Kind::QuasiDefinite);
-    indefinite_->analyse(r.pattern);
-  }
+  if (!indefinite_) indefinite_ = analysed(Kind::QuasiDefinite);
   const Stopwatch watch(timings.factor);
   current_ = indefinite_.get();
   ++timings.factorisations;

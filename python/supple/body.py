@@ -94,8 +94,9 @@ class Body(Setup):
             rtol: of max(‖external force‖, ‖reactions‖); the last step is ≤ 1e-8 of the size too.
             atol: N; rounding of the stiffness if None.
             max_iterations: of each load step.
-            solver: of the linear equations. "direct" factorises at every iteration. "cg" keeps
-                factors, over iterations, load steps and solves of this body, and iterates on them,
+            solver: of the linear equations. "direct" factorises at every iteration, but for a last
+                one that the factor at hand is sure to be enough for. "pardiso" (extra "mkl") does
+                the same by MKL's library. "cg" keeps factors, in single precision, over iterations, load steps and solves of this body, and iterates on them,
                 so that a result depends on what was solved before, by less than the tolerances.
                 "multigrid" (extra "multigrid") never factorises the whole matrix: for large bodies.
                 "auto" picks one; `State.timings["solver"]` says which and why.

@@ -22,7 +22,7 @@ def load() -> None:
     if library is None:
         raise InputError(
             f'solver="pardiso" needs MKL, and no libmkl_rt is in {_folders()[0]}; '
-            'pip install mkl, or choose solver="auto".'
+            'pip install "supple[mkl]", or choose solver="auto".'
         )
     try:
         core().load_pardiso(str(library))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from . import multigrid
+from . import mkl, multigrid
 from .choices import SYMMETRIC_SOLVERS
 from .core import core
 from .errors import InputError
@@ -51,6 +51,9 @@ def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
         asked: one of `choices.SYMMETRIC_SOLVERS`, which are for direct forms.
         unknowns: free dofs.
         gmres: an inverse form is to be solved so.
+
+    Raises:
+        InputError: the solver asked for is not installed, or not for such a body.
     """
     if gmres:
         return Pick("gmres", "one symmetric factor serves many unsymmetric tangents")
@@ -62,6 +65,9 @@ def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
                 "no pressure that follows, no mixed formulation, no inverse form; "
                 'choose solver "direct".'
             )
+    if asked == "pardiso":
+        mkl.load()
+        return Pick("pardiso", "as asked")
     if not system.is_minimised():
         return Pick("direct", "only tangents that should be positive definite have another way")
     if asked != "auto":

@@ -14,7 +14,7 @@ def test_a_missing_library_is_named_with_the_remedy(
 ) -> None:
     """An environment without MKL: one sentence with what is missing, where, and two ways out."""
     monkeypatch.setattr(mkl, "_folders", lambda: [tmp_path])
-    with pytest.raises(InputError, match=r'libmkl_rt.*pip install mkl.*solver="auto"'):
+    with pytest.raises(InputError, match=r'libmkl_rt.*pip install .supple.mkl...*solver="auto"'):
         mkl.load()
 
 

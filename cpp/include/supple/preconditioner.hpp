@@ -22,8 +22,12 @@ class Preconditioner {
   /// How many iterations an update costs: with more than so many it pays to make M anew. From
   /// counts and not from the clock, so that the same problem is solved in the same way each time.
   virtual int break_even() const = 0;
-  /// Whether M is A itself, so that an update that was ok proves A positive definite.
+  /// Whether M is A itself but for rounding: conjugate gradients want few iterations, or a new M.
   virtual bool exact() const { return true; }
+  /// Whether an update that was ok proves A positive definite.
+  virtual bool proves() const { return exact(); }
+  /// M of the matrix at hand served badly: whether the next update is to be more exact than that.
+  virtual bool sharpen() { return false; }
   /// Another matrix is at hand, for which M may still serve: keep what multiply needs of it.
   virtual void take(const CscPattern&, const Vector&) {}
   /// y = A x with the matrix last taken or updated; false where there is no quick way to it.
@@ -36,7 +40,9 @@ class Preconditioner {
 
 using MakePreconditioner = std::function<std::unique_ptr<Preconditioner>()>;
 
-/// M = A itself, by Cholesky.
+/// M = A but for rounding, by Cholesky: in single precision as long as that serves, which takes
+/// half the time and memory, then in double. That A is not positive definite is for the latter to
+/// say.
 std::unique_ptr<Preconditioner> make_factor_preconditioner();
 
 } // namespace supple

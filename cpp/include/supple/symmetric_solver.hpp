@@ -50,6 +50,8 @@ class SymmetricSolver {
 
   /// What is known of the matrix at hand.
   Definite definite() const { return definite_; }
+  /// Find out whether it is definite, where that is unknown; it may stay so.
+  void find_definite();
 
   /// Let go of what is kept, so that results do not depend on what was solved before.
   void forget();

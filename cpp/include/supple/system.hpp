@@ -23,9 +23,10 @@ struct Timings {
 
 /// How the tangents of a symmetric positive definite body are solved with.
 enum class Method {
-  Direct, ///< a factor of each
-  Kept,   ///< conjugate gradients on a factor that is kept while it serves
-  Grid    ///< conjugate gradients on multigrid; the whole matrix is never factorised
+  Direct,  ///< a factor of each
+  Pardiso, ///< the same by MKL, of other kinds of tangents too
+  Kept,    ///< conjugate gradients on a factor that is kept while it serves
+  Grid     ///< conjugate gradients on multigrid; the whole matrix is never factorised
 };
 
 class System {
@@ -47,6 +48,7 @@ class System {
   void use_gmres(bool gmres);
   /// Solve so where factors may be kept (`prepare`) and the kind is Cholesky; what is kept is let
   /// go of when the method changes, or with forget_kept.
+  /// @throws StateError if MKL was not loaded (pardiso.hpp).
   void use_method(Method method);
   void forget_kept();
   /// What Method::Grid makes its levels of: see Multigrid.
@@ -107,6 +109,9 @@ class System {
   Vector solve(const ConstVector& rhs, double tolerance = 1e-10, bool probe = false);
   /// What is known of the signs of the eigenvalues of the tangent last prepared or factorised.
   Definite definite() const;
+  /// The same, but find out where it is unknown: by iterations or by a factor, whichever costs
+  /// less.
+  Definite find_definite();
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
   /// The step d (dofs) from `u`, its free nodes on arcs: NodeRotations::along_arcs.
@@ -120,7 +125,10 @@ class System {
 
  private:
   bool iterates() const { return gmres_ && kind() == Kind::Unsymmetric; }
-  bool keeps() const { return method_ != Method::Direct && kind() == Kind::Cholesky; }
+  bool keeps() const {
+    return (method_ == Method::Kept || method_ == Method::Grid) && kind() == Kind::Cholesky;
+  }
+  std::unique_ptr<Factor> analysed(Kind kind);
   FactorStatus prepare_inverse();
   SymmetricSolver& symmetric();
   const NodeRotations& rotations();
