@@ -95,7 +95,7 @@ def test_column_that_buckles_is_refused_though_its_kept_factor_is_definite():
     for solver in ("cg", "direct"):
         with pytest.raises(supple.ConvergenceError, match="unstable") as caught:
             body.solve(solver=solver)
-        refusals.append(str(caught.value))
+        refusals.append(caught.value.cause)  # the worst cells are alike by symmetry
     assert refusals[0] == refusals[1]
 
 
