@@ -15,6 +15,7 @@
     unit        the name of one kernel library, such as neo_hookean.P1.direct
     parts       a long kernel as several functions
     fingerprint the mark by which a library is known to be of this generator
+    represent   FFCx's intermediate representation of forms
     simd/       FFCx's graph as C on vectors of cells
     targets     processors that kernels are compiled ahead for
     generate    unit → C source with its kernel table

@@ -1,8 +1,7 @@
-#include <array>
-#include <mutex>
 #include <utility>
 
 #include "group_orders.hpp"
+#include "recent.hpp"
 #include "symbolic.hpp"
 
 namespace supple {
@@ -15,15 +14,7 @@ bool worth_metis(const GroupGraph& graph, double flops) {
   return saved * flops > an_edge * static_cast<double>(graph.row.size());
 }
 
-} // namespace
-
-std::shared_ptr<const Analysis> shared_analysis(const CscPattern& lower) {
-  static std::mutex mutex;
-  static std::array<std::weak_ptr<const Analysis>, 4> known; // the newest
-  static std::size_t oldest = 0;
-  const std::lock_guard<std::mutex> lock(mutex);
-  for (const std::weak_ptr<const Analysis>& one : known)
-    if (const auto k = one.lock(); k && k->pattern == lower) return k;
+std::shared_ptr<const Analysis> analyse(const CscPattern& lower) {
   const GroupGraph graph(lower);
   GroupOrders orders(graph);
   auto fresh = std::make_shared<Analysis>();
@@ -37,8 +28,15 @@ std::shared_ptr<const Analysis> shared_analysis(const CscPattern& lower) {
       fresh->ordering = "METIS";
     }
   }
-  known[oldest++ % known.size()] = fresh;
   return fresh;
+}
+
+} // namespace
+
+std::shared_ptr<const Analysis> shared_analysis(const CscPattern& lower) {
+  static Recent<Analysis> known;
+  return known.find([&](const Analysis& one) { return one.pattern == lower; },
+                    [&] { return analyse(lower); });
 }
 
 } // namespace supple

@@ -1,12 +1,11 @@
 #include "supernodal_tree.hpp"
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <limits>
-#include <mutex>
 #include <numeric>
 
+#include "recent.hpp"
 #include "strips.hpp"
 #include "supple/error.hpp"
 
@@ -273,19 +272,16 @@ std::shared_ptr<const TreeReport> shared_tree(const CscPattern& pattern, int bra
     Index lanes;
     TreeReport report;
   };
-  static std::mutex mutex;
-  static std::array<std::weak_ptr<const Known>, 4> known; // the newest
-  static std::size_t oldest = 0;
-  const std::lock_guard<std::mutex> lock(mutex);
-  for (const std::weak_ptr<const Known>& one : known) {
-    const std::shared_ptr<const Known> k = one.lock();
-    if (k && k->branches == branches && k->lanes == lanes && k->pattern == pattern)
-      return {k, &k->report};
-  }
-  const auto fresh = std::make_shared<const Known>(
-      Known{pattern, branches, lanes, make_tree(pattern, branches, lanes)});
-  known[oldest++ % known.size()] = fresh;
-  return {fresh, &fresh->report};
+  static Recent<Known> known;
+  const std::shared_ptr<const Known> found = known.find(
+      [&](const Known& one) {
+        return one.branches == branches && one.lanes == lanes && one.pattern == pattern;
+      },
+      [&] {
+        return std::make_shared<const Known>(
+            Known{pattern, branches, lanes, make_tree(pattern, branches, lanes)});
+      });
+  return {found, &found->report};
 }
 
 } // namespace supple

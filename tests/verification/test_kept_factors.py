@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 
@@ -97,8 +95,8 @@ def test_column_that_buckles_is_refused_though_its_kept_factor_is_definite():
     for solver in ("cg", "direct"):
         with pytest.raises(supple.ConvergenceError, match="unstable") as caught:
             body.solve(solver=solver)
-        refusals.append(re.sub(r"cells \[.*?\]", "cells", str(caught.value)))
-    assert refusals[0] == refusals[1]  # but for the cells, which follow the rounding
+        refusals.append(caught.value.cause)  # the worst cells are alike by symmetry
+    assert refusals[0] == refusals[1]
 
 
 def test_unknown_solver_is_refused_with_the_names_that_there_are():
