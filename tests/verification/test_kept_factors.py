@@ -117,7 +117,8 @@ def test_only_multigrid_that_auto_took_gives_way_to_factors():
     """Where no equilibrium was found: not what was asked for, nor a factor past the memory."""
     grid = solvers.Pick("multigrid", "")
     other = solvers.behind(grid, "auto", 50_000)
-    assert other is not None and other.name == "cg"
+    assert other is not None
+    assert other.name == "cg"
     assert solvers.behind(grid, "multigrid", 50_000) is None
     assert solvers.behind(grid, "auto", 5_000_000) is None
     assert solvers.behind(other, "auto", 50_000) is None
