@@ -8,7 +8,7 @@ namespace {
 constexpr int kMostSteps = 20;
 constexpr std::ptrdiff_t kWorthThreads = 10'000; // nodes
 constexpr double kStraight = 1e-6;               // angle below which an arc is none
-constexpr double kNear = 1e-6; // more is not needed of a preconditioner, it only must stay regular
+constexpr double kNear = 1e-3; // a last step, which leaves its square: enough to precondition with
 
 /// Σ b aᵀ about the means of n vectors, from the sums.
 class Mixed {

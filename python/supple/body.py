@@ -96,7 +96,8 @@ class Body(Setup):
             max_iterations: of each load step.
             solver: of the linear equations. "direct" factorises at every iteration, but for a last
                 one that the factor at hand is sure to be enough for. "pardiso" (extra "mkl") does
-                the same by MKL's library. "cg" keeps factors, in single precision, over iterations, load steps and solves of this body, and iterates on them,
+                the same by MKL's library. "cg" keeps factors, in single precision where that
+                serves, over iterations, load steps and solves of this body, and iterates on them,
                 so that a result depends on what was solved before, by less than the tolerances.
                 "multigrid" (extra "multigrid") never factorises the whole matrix: for large bodies.
                 "auto" picks one; `State.timings["solver"]` says which and why.

@@ -94,7 +94,8 @@ def run(
     native.refuse_inversion = inverse or len(barriers) < len(laws)
     scalars = np.zeros(built.system.scalars)
     built.system.set_free(np.append(~fixed.ravel(), scalars == 0))
-    built.solver = solvers.pick(settings.solver, built.system, int((~fixed).sum()), gmres)
+    unknowns = int((~fixed).sum())
+    built.solver = solvers.pick(settings.solver, built.system, unknowns, gmres)
     solvers.use(built.solver, built.system, body.mesh)
     built.system.reset_timings()
     target = np.append(-body._prescribed if inverse else body._prescribed, scalars)
@@ -103,6 +104,11 @@ def run(
     else:
         start[fixed.size :] /= built.scalar_unit
     result = solve(built.system, start, target, native, settings, judge)
+    other = solvers.behind(built.solver, settings.solver, unknowns)
+    if other and result.outcome.name != "converged":
+        built.solver = other
+        solvers.use(other, built.system, body.mesh)
+        result = solve(built.system, start, target, native, settings, judge)
     profile.native(built.system.timings, len(result.history))
     return result, built
 

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from .mesh import Mesh
 
 #: Unknowns from which a factor is worth keeping: below, making one costs no more than calls do.
-_KEEP = 2_000
-#: Flops of a factor for each unknown from which multigrid is quicker, forming and solving; measured
-#: on blocks, where that is some 60,000 unknowns.
-_HEAVY = 1e6
-#: Unknowns below which no factor is that heavy, and above which it need not be asked.
-_LIGHT, _HUGE = 30_000, 300_000
+_KEEP = 1_000
+#: Flops of a factor for each unknown from which multigrid is quicker than a factor in single
+#: precision, what it takes to ask included; that of a P1 block of some 25,000 unknowns. Slender
+#: bodies stay below, and solve a second time 1.3 to 1.7 times as fast on a factor.
+_HEAVY = 4e5
+#: Unknowns below which to order them, and so to count the flops, costs more than multigrid gains,
+#: and above which they need not be counted.
+_LIGHT, _HUGE = 20_000, 300_000
 
 
 @dataclass(frozen=True)
@@ -79,12 +81,23 @@ def pick(asked: str, system: Any, unknowns: int, gmres: bool = False) -> Pick:
     if multigrid.available() and unknowns > _HUGE:
         return Pick("multigrid", f"{unknowns:,} unknowns are many for a factor")
     flops, entries = system.predicted_factor()
-    size = f"a factor of {unknowns:,} unknowns takes {flops:.1e} flops and {8e-9 * entries:.1f} GB"
+    size = f"a factor of {unknowns:,} unknowns takes {flops:.1e} flops and {4e-9 * entries:.2g} GB"
     if flops < _HEAVY * unknowns:
         return Pick("cg", f"{size}, worth keeping")
     if multigrid.available():
         return Pick("multigrid", f"{size}, more than iterations do")
     return Pick("cg", f'{size}; pip install "supple[multigrid]" would spare that')
+
+
+def behind(picked: Pick, asked: str, unknowns: int) -> Pick | None:
+    """What to try where a solve found no equilibrium, if another way could find one.
+
+    Along a path past limit points goes only what has factors of indefinite tangents, which
+    multigrid, that was not asked for, has not.
+    """
+    if asked != "auto" or picked.name != "multigrid" or unknowns > _HUGE:
+        return None
+    return Pick("cg", "multigrid found no equilibrium")
 
 
 def use(picked: Pick, system: Any, mesh: Mesh) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import supple
+from supple import solvers
 
 LENGTH = 0.2
 
@@ -110,3 +111,14 @@ def test_auto_says_what_it_took_and_why():
     assert beam().solve().timings["solver"].startswith("direct: a factor of ")
     follower = beam().pressure(lambda p: p[:, 2] > 0.02 - 1e-9, 1.0)
     assert follower.solve(solver="cg").timings["solver"].startswith("direct: only tangents")
+
+
+def test_only_multigrid_that_auto_took_gives_way_to_factors():
+    """Where no equilibrium was found: not what was asked for, nor a factor past the memory."""
+    grid = solvers.Pick("multigrid", "")
+    other = solvers.behind(grid, "auto", 50_000)
+    assert other is not None
+    assert other.name == "cg"
+    assert solvers.behind(grid, "multigrid", 50_000) is None
+    assert solvers.behind(grid, "auto", 5_000_000) is None
+    assert solvers.behind(other, "auto", 50_000) is None
