@@ -106,6 +106,12 @@ def step(unit):
     return 2e-3 if unit.split(".")[0] in SMOOTH else 2e-4
 
 
+def short_of_kinks(f, slope, x, d, h):
+    """h, or a tenth of it where it crosses a kink: the difference is then off by its jump."""
+    off = abs((f(x + h * d) - f(x - h * d)) / (2 * h) - slope).max()
+    return h / 10 if off > 1e-3 * abs(slope).max() else h
+
+
 def direction(size):
     return np.random.default_rng(2).uniform(-1, 1, size)
 
@@ -123,7 +129,9 @@ def test_tangent_is_the_derivative_of_the_residual(unit, case, assert_slope):
     """K d against central differences of R."""
     d = direction(case.x.size)
     slope = dense(case.system, case.x) @ d
-    h = step(unit) / (10 if unit.split(".")[0] in KINKED else 1)  # crosses no kink
+    h = step(unit)
+    if unit.split(".")[0] in KINKED:
+        h = short_of_kinks(lambda x: case.system.residual(x, 1.0), slope, case.x, d, h / 10)
     assert_slope(lambda x: case.system.residual(x, 1.0), slope, case.x, d, h)
 
 
