@@ -90,8 +90,12 @@ def unknowns_of(body: Body, start: Equilibrium) -> Floats:
     """The unknowns of an equilibrium to start from, which may be one of another formulation.
 
     Raises:
-        InputError: it is not of this mesh.
+        InputError: it is no equilibrium, or not of this mesh.
     """
+    if not hasattr(start, "u"):
+        raise InputError(
+            f"start must be a state, as solve gives it, or None, got {type(start).__name__}."
+        )
     if start.u.shape != body.mesh.points.shape:
         raise InputError(
             f"start must be a state of this mesh with {len(body.mesh.points)} nodes, "

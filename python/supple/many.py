@@ -40,8 +40,11 @@ class Request:
     settings: dict[str, Any]
 
     def __post_init__(self) -> None:
-        if self.processes is not None and self.processes < 1:
-            raise InputError(f"processes must be at least 1 or None, got {self.processes}.")
+        whole = isinstance(self.processes, int) and not isinstance(self.processes, bool)
+        if self.processes is not None and not (whole and self.processes >= 1):
+            raise InputError(
+                f"processes must be at least 1, a whole number, or None, got {self.processes!r}."
+            )
         from .body import Body
 
         known = set(inspect.signature(Body.solve).parameters) - {"self", "start", "progress"}

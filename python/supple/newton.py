@@ -166,9 +166,15 @@ def _unloaded(body: Body, settings: Settings, inverse: bool) -> Floats | None:
 
 
 def _rounding(body: Body) -> float:
-    """Size of the rounding errors in the internal forces, N: moduli × area, springs × place."""
+    """Size of the rounding errors in the internal forces, N: moduli × area, springs × place.
+
+    Of the moduli, the bulk modulus where the displacement carries the volume: as large beside
+    Young's as Poisson's ratio is near to 1/2.
+    """
     mesh, d = body.mesh, body._description
-    total = 1e-14 * terms.modulus(d) * mesh.size**2
+    ratios = [r.values["poisson"].max() for r in d.regions if len(r.ids) and "poisson" in r.values]
+    stiffening = max([1.0, *(1 / (3 * (1 - 2 * ratio)) for ratio in ratios if ratio < 0.5)])
+    total = 1e-14 * stiffening * terms.modulus(d) * mesh.size**2
     for slide in d.slides:
         place = max(np.abs(mesh.points).max(), np.abs(slide.surface.points).max())
         total += 2e-15 * float(np.linalg.norm(slide.stiffness)) * float(place)

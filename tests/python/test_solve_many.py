@@ -118,8 +118,9 @@ def test_wrong_entries_are_refused_by_their_number_before_anything_is_solved() -
     for entry in ({"yuong": 1e3}, {"young": -1.0}, {"nowhere.young": 1e3}, 1e3):
         with pytest.raises(supple.InputError, match=r"^parameters\[1\]: "):
             body().solve_many([{"young": 1e4}, entry], progress=solved)
-    with pytest.raises(supple.InputError, match="processes must be at least 1"):
-        body().solve_many([], processes=0)
+    for wrong in (0, "2", 1.5, True):
+        with pytest.raises(supple.InputError, match="processes must be at least 1"):
+            body().solve_many([], processes=wrong)
     with pytest.raises(supple.InputError, match="rtoll is no setting"):
         body().solve_many([], rtoll=1e-3)
     assert body().solve_many([]) == []

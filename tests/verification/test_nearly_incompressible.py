@@ -76,3 +76,16 @@ def test_an_impossible_load_is_refused_and_the_body_stays_as_it_was():
     again = body.clear_loads().gravity((0.0, 0.0, -9.81)).solve()
     np.testing.assert_array_equal(again.u, before.u)
     np.testing.assert_array_equal(again.pressure, before.pressure)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4995, 0.4999, 0.49999])
+@pytest.mark.parametrize("density", [3.0, 30.0])
+def test_a_light_load_on_a_body_that_hardly_shrinks_is_carried(poisson, density):
+    """Forces below the rounding of the bulk stiffness count as none: the load's own is above it."""
+    mesh = supple.Mesh.box((4, 4, 4), (0.1, 0.1, 0.1), "P1")
+    body = supple.Body(mesh, "neo_hookean", young=1e4, poisson=poisson, density=density)
+    body.fix(lambda p: p[:, 0] < 1e-9).gravity((0.0, 0.0, -9.81))
+    state = body.solve()
+    assert state.iterations < 10
+    weight = density * 0.1**3 * 9.81
+    assert state.reactions[:, 2].sum() == pytest.approx(weight, rel=1e-5)
