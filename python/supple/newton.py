@@ -178,7 +178,7 @@ def _rounding(body: Body) -> float:
     for slide in d.slides:
         place = max(np.abs(mesh.points).max(), np.abs(slide.surface.points).max())
         total += 2e-15 * float(np.linalg.norm(slide.stiffness)) * float(place)
-    return total
+    return float(total)
 
 
 def _normals(body: Body) -> dict[int, Floats]:
