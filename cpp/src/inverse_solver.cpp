@@ -28,14 +28,9 @@ InverseSolver::InverseSolver(const BlockPattern& pattern, const Reduction& reduc
                              const Vector& points)
     : pattern_(pattern), reduction_(reduction), free_(free_of(pattern, reduction)),
       relabelling_(std::make_unique<Relabelling>(pattern, free_, points)),
-      mirror_(mirror(pattern, reduction)), definite_(pattern.scalars() == 0) {}
+      mirror_(mirror(pattern, reduction)) {}
 
 InverseSolver::~InverseSolver() = default;
-
-void InverseSolver::forget() {
-  kept_ = nullptr;
-  definite_ = pattern_.scalars() == 0;
-}
 
 FactorStatus InverseSolver::prepare(const Vector& tangent, const ConstVector& u) {
   tangent_ = &tangent;
@@ -49,6 +44,7 @@ FactorStatus InverseSolver::prepare(const Vector& tangent, const ConstVector& u)
 
 FactorStatus InverseSolver::factorise() {
   const Stopwatch watch(work.factor);
+  if (symmetric_.size() == 0) symmetric_.analyse(reduction_.pattern);
   relabelling_->scale_columns(*tangent_, scaled_);
   reduced_.resize(reduction_.pattern.nonzeros());
   for (std::size_t k = 0; k < mirror_.size(); ++k) {
@@ -56,13 +52,6 @@ FactorStatus InverseSolver::factorise() {
         0.5 * (scaled_[reduction_.source[k]] + scaled_[mirror_[k]]);
   }
   ++work.symmetric;
-  if (definite_) { // as the direct tangent is, but for a mixed form's
-    if (single_.size() == 0) single_.analyse(reduction_.pattern);
-    const FactorStatus status = keep(single_);
-    if (status.ok()) return status;
-    definite_ = false;
-  }
-  if (symmetric_.size() == 0) symmetric_.analyse(reduction_.pattern);
   return keep(symmetric_);
 }
 

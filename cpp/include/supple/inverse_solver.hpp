@@ -1,11 +1,10 @@
 /// Solves with the tangents of an inverse form, one after the other, on few factorisations.
 ///
 ///     A = K D, D = −F⁻¹ at the nodes       near to symmetric, and to the A of other rest shapes
-///     factor of (A + Aᵀ)/2 at one of them  at the loaded shape itself it is the direct tangent
+///     LDLᵀ of (A + Aᵀ)/2 at one of them    at the loaded shape itself it is the direct tangent
 ///     GMRES on A preconditioned by it      5 iterations for 2 digits, 20 for 8, at 30 % strain
 ///
-/// The factor is LLᵀ in single precision, LDLᵀ where there is none such or the form is mixed. A new
-/// one where the iterations cost more than it; LU of A where GMRES does not get there even
+/// A new factor where the iterations cost more than it; LU of A where GMRES does not get there even
 /// so: it fails where LU fails and nowhere else.
 #pragma once
 
@@ -39,7 +38,7 @@ class InverseSolver {
   bool solve(const Vector& rhs, double tolerance, Vector& x);
 
   /// Let go of the factor that is kept, so that results do not depend on what was solved before.
-  void forget();
+  void forget() { kept_ = nullptr; }
 
   SolverWork work;
 
@@ -57,10 +56,8 @@ class InverseSolver {
   std::unique_ptr<Relabelling> relabelling_;
   std::vector<Index> mirror_;
   std::unique_ptr<Reduction> full_; // for LU, made when it is first needed
-  Factor single_{Kind::Cholesky, Precision::Single};
   Factor symmetric_{Kind::QuasiDefinite}, lu_{Kind::Unsymmetric};
   Factor* kept_ = nullptr; // that preconditions
-  bool definite_;          // the symmetric part may be
   bool fresh_ = false;     // it is of the tangent at hand
   bool worn_ = false;      // a new one would have cost less
   const Vector* tangent_ = nullptr;
