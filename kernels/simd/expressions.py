@@ -76,7 +76,7 @@ class Expressions:
         if type(node) in _LOGIC:
             sign = _LOGIC[type(node)]
             return Code(f"({self(node.lhs).text} {sign} {self(node.rhs).text})", "mask")
-        raise NotImplementedError(f"no C in lanes for {type(node).__name__}")
+        raise TypeError(f"FFCx's graph holds a {type(node).__name__}, which has no C in lanes")
 
     def _conditional(self, node: Any) -> Code:
         chosen = f"{self.vector(node.true)}, {self.vector(node.false)}"

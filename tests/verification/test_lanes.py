@@ -134,7 +134,7 @@ def test_lanes_give_what_one_cell_at_a_time_gives(unit):
         found = dict(zip(kernels, cells.tabulate(False, *kernels), strict=True))
         scale = abs(expected["residual"]).max(axis=1)
         tame = scale < np.exp(40.0)
-        assert tame.any()
+        assert 2 * tame.sum() >= tame.size
         if "tangent" in kernels:
             stiffness = abs(expected["tangent"]).max(axis=1)
             off = worst(found["tangent"], expected["tangent"])
