@@ -50,7 +50,7 @@ def _times(panel: Any, rows: Sequence[Any]) -> None:
     panel.loglog([first, last], [base * first / last, base], ":", color="#999999", label="∝ dofs")
     panel.set_xlabel("dofs")
     panel.set_ylabel("seconds")
-    panel.legend(fontsize=7, loc="upper left")
+    panel.legend(fontsize=7, loc="lower right", ncols=2)
     panel.grid(True, which="major", lw=0.3)
 
 
@@ -61,5 +61,7 @@ def _memory(panel: Any, rows: Sequence[Any], solvers: Sequence[str]) -> None:
     panel.set_title("peak memory with Python")
     panel.set_xlabel("dofs")
     panel.set_ylabel("MB")
+    panel.yaxis.set_major_formatter("{x:.0f}")
+    panel.yaxis.set_minor_formatter("{x:.0f}")
     panel.legend(fontsize=7)
     panel.grid(True, which="major", lw=0.3)
