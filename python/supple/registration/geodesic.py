@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -15,7 +13,7 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 #: Where an edge may be crossed, at first, as shares of it.
-_TRIED = np.array([1 / 6, 1 / 2, 5 / 6])
+_TRIED = (np.arange(5) + 0.5) / 5
 
 
 class Ways:
@@ -53,40 +51,40 @@ class Ways:
             np.array([start.barycentric[0], *(w for _, w in passed), end.barycentric[0]]),
         )
 
-    def _nodes(self, triangle: int) -> Ints:
-        """(9,) tried places on the edges of a triangle."""
-        return (len(_TRIED) * self._edges[triangle][:, None] + np.arange(len(_TRIED))).ravel()
-
-    def _linked(self) -> Any:
-        """Lengths between the tried places on two edges of one triangle."""
-        from scipy.sparse import coo_array
-
+    def _linked(self) -> tuple[Ints, Ints, Floats]:
+        """Pairs of tried places on two edges of one triangle, and how far apart they are."""
         k = len(_TRIED)
         nodes = (k * self._edges[:, :, None] + np.arange(k)).reshape(-1, 3 * k)
-        i, j = (x.ravel() for x in np.nonzero(np.subtract.outer(*[np.arange(3 * k) // k] * 2) > 0))
+        i, j = np.nonzero(np.subtract.outer(np.arange(3 * k) // k, np.arange(3 * k) // k) > 0)
         rows, columns = nodes[:, i].ravel(), nodes[:, j].ravel()
         far = np.linalg.norm(self._tried[rows] - self._tried[columns], axis=1)
-        return coo_array((far, (rows, columns)), shape=[len(self._tried)] * 2).tocsr()
+        return rows, columns, far
+
+    def _linked_to(self, place: OnSurface, node: int) -> tuple[Ints, Ints, Floats]:
+        """The same of a place, which is node ``node``, and those on its triangle's edges."""
+        k = len(_TRIED)
+        nodes = (k * self._edges[place.triangle[0]][:, None] + np.arange(k)).ravel()
+        at = place.at(self._points, self._triangles)[0]
+        return np.full(3 * k, node), nodes, np.linalg.norm(self._tried[nodes] - at, axis=1)
 
     def _crossed(self, start: OnSurface, end: OnSurface) -> Ints:
         """Edges between two places; none within a triangle."""
+        from scipy.sparse import coo_array
         from scipy.sparse.csgraph import dijkstra
 
-        first, last = int(start.triangle[0]), int(end.triangle[0])
-        if first == last:
+        if start.triangle[0] == end.triangle[0]:
             return np.zeros(0, dtype=np.int64)
-        a, b = (place.at(self._points, self._triangles)[0] for place in (start, end))
-        begin, arrive = self._nodes(first), self._nodes(last)
-        out, came = dijkstra(self._links, directed=False, indices=begin, return_predecessors=True)
-        whole = (np.linalg.norm(self._tried[begin] - a, axis=1)[:, None] + out[:, arrive]
-                 + np.linalg.norm(self._tried[arrive] - b, axis=1))  # fmt: skip
-        if not np.isfinite(whole).any():
-            raise MeshError("two landmarks lie on parts of the skin that do not touch; join them.")
-        row, column = np.unravel_index(int(whole.argmin()), whole.shape)
-        node, passed = int(arrive[column]), []
-        while node >= 0:
+        first = len(self._tried)
+        parts = (self._links, self._linked_to(start, first), self._linked_to(end, first + 1))
+        rows, columns, far = (np.concatenate(column) for column in zip(*parts, strict=True))
+        graph = coo_array((far, (rows, columns)), shape=(first + 2, first + 2)).tocsr()
+        _, came = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
+        passed, node = [], int(came[first + 1])
+        while 0 <= node < first:
             passed.append(node // len(_TRIED))
-            node = int(came[row, node])
+            node = int(came[node])
+        if node != first:
+            raise MeshError("two landmarks lie on parts of the skin that do not touch; join them.")
         return np.array(passed[::-1])
 
     def _on_edge(self, edge: int, share: float) -> tuple[int, Floats]:

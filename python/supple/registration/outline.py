@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -53,8 +53,10 @@ def cut_along(template: Template, curve: str, inside: str) -> Cut:
         MeshError: the curve does not go once around the landmark, on one sheet of skin.
     """
     distance = signed_distance(template, curve, inside)
-    corners, share, triangles = _clipped(template.triangles, distance)
-    return Cut(corners, share, triangles, _loop(triangles, curve), distance)
+    corners, share, loops = _clipped(template.triangles, distance)
+    whole = Cut(corners, share, np.empty((0, 3), dtype=np.int64), np.empty(0, np.int64), distance)
+    triangles = _split(loops, whole.at(template.points))
+    return replace(whole, triangles=triangles, rim=_loop(triangles, curve))
 
 
 def signed_distance(template: Template, curve: str, inside: str) -> Floats:
@@ -111,15 +113,15 @@ def _flooded(faces: Ints, side: Floats, near: Mask) -> Floats:
     return np.where(near, side, np.where(votes[part] > 0, 1.0, -1.0))
 
 
-def _clipped(faces: Ints, level: Floats) -> tuple[Ints, Floats, Ints]:
-    """Corners (q, 2) and shares (q,) of points, and triangles (t, 3) of them, where level ≤ 0."""
+def _clipped(faces: Ints, level: Floats) -> tuple[Ints, Floats, list[list[int]]]:
+    """Corners (q, 2) and shares (q,) of points, and loops of 3 or 4 of them, where level ≤ 0."""
     names: dict[tuple[int, int], int] = {}
 
     def name(a: int, b: int) -> int:
         """The point where the level is 0 between two vertices; of one vertex, itself."""
         return names.setdefault((min(a, b), max(a, b)), len(names))
 
-    triangles: list[tuple[int, int, int]] = []
+    loops = []
     for face in faces[(level[faces] < 0).any(axis=1)].tolist():
         loop: list[int] = []
         for a, b in zip(face, face[1:] + face[:1], strict=True):
@@ -127,11 +129,24 @@ def _clipped(faces: Ints, level: Floats) -> tuple[Ints, Floats, Ints]:
                 loop.append(name(a, a))
             if level[a] * level[b] < 0:
                 loop.append(name(a, b))
-        triangles += [(loop[0], loop[k], loop[k + 1]) for k in range(1, len(loop) - 1)]
+        loops.append(loop)
     corners = np.array(list(names), dtype=np.int64).reshape(-1, 2)
     first, second = level[corners].T
-    apart = np.where(corners[:, 0] == corners[:, 1], 1.0, first - second)
-    return corners, np.where(corners[:, 0] == corners[:, 1], 0.0, first / apart), np.array(triangles)
+    whole = corners[:, 0] == corners[:, 1]
+    return corners, np.where(whole, 0.0, first / np.where(whole, 1.0, first - second)), loops
+
+
+def _split(loops: list[list[int]], points: Floats) -> Ints:
+    """Triangles (t, 3) of loops, a loop of 4 along its shorter diagonal: both breasts alike."""
+    triangles = []
+    for loop in loops:
+        if len(loop) == 4:
+            a, b, c, d = points[loop]
+            turned = loop if np.linalg.norm(a - c) < np.linalg.norm(b - d) else loop[1:] + loop[:1]
+            triangles += [turned[:3], [turned[0], *turned[2:]]]
+        else:
+            triangles.append(loop)
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
 def _loop(triangles: Ints, curve: str) -> Ints:
