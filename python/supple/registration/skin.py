@@ -13,14 +13,25 @@ Mask = npt.NDArray[np.bool_]
 _EDGES = ((0, 1), (1, 2), (2, 0))
 
 
-def vertex_normals(points: Floats, triangles: Ints) -> Floats:
-    """Unit normals (n, 3), of a vertex the mean of its triangles' by area; 0 without triangles."""
+def vertex_normals(points: Floats, triangles: Ints, smoothed: int = 0) -> Floats:
+    """Unit normals (n, 3), of a vertex the mean of its triangles' by area; 0 without triangles.
+
+    Args:
+        smoothed: how often to take the mean over each triangle, and of those again.
+    """
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    normals = np.zeros_like(points)
-    for k in range(3):
-        np.add.at(normals, triangles[:, k], np.cross(b - a, c - a))
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals / np.where(length > 0, length, 1.0))
+    normals = _gathered(np.cross(b - a, c - a), triangles, len(points))
+    for _ in range(smoothed):
+        normals = _gathered(normals[triangles].mean(axis=1), triangles, len(points))
+    return normals
+
+
+def _gathered(of_triangles: Floats, triangles: Ints, count: int) -> Floats:
+    """Unit sums (n, 3) at the corners of what triangles (t, 3) have."""
+    own, whole = triangles.ravel(), np.repeat(of_triangles, 3, axis=0)
+    sums = np.stack([np.bincount(own, whole[:, k], count) for k in range(3)], axis=1)
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.asarray(sums / np.where(length > 0, length, 1.0))
 
 
 def edges(triangles: Ints) -> Ints:

@@ -20,6 +20,7 @@ from supple.registration.skin import edges, free_edges, vertex_normals
 from supple.registration.template import OnSurface, Template
 
 if TYPE_CHECKING:
+    from supple.registration.registration import Registration
     from supple.surface import Surface
 
 Floats = npt.NDArray[np.float64]
@@ -30,8 +31,8 @@ Mask = npt.NDArray[np.bool_]
 REACH = 10e-3
 #: Over a hole, the closest point is on its rim, this far (m) or farther to the side.
 RIM = 2e-3
-#: Least cosine between the normals of skin and scan.
-FACING = 0.3
+#: Least cosine between the normals of skin and scan, the scan's smoothed so many times.
+FACING, _SMOOTHED = 0.3, 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,6 +87,17 @@ class Transfer:
     _rim: Mask = field(init=False)  # (t, 3) free edges of the scan
     _rim_points: Mask = field(init=False)  # (m,) their ends
     _normals: Floats = field(init=False)  # (n, 3) of the registered skin
+    _scan_normals: Floats = field(init=False)  # (m, 3) of the scan
+
+    @classmethod
+    def of(cls, registration: Registration, scan: Surface, reach: float = REACH) -> Transfer:
+        """That of a registration to ``scan``, without what it found to be clutter."""
+        from supple.surface import Surface
+
+        kept = scan.triangles
+        if len(registration.used) == len(scan.points):
+            kept = kept[registration.used[kept].all(axis=1)]
+        return cls(registration.template, registration.points, Surface(scan.points, kept), reach)
 
     def __post_init__(self) -> None:
         from supple.core import core
@@ -105,6 +117,7 @@ class Transfer:
             "_rim": rim,
             "_rim_points": rim_points,
             "_normals": vertex_normals(self.points, skin),
+            "_scan_normals": vertex_normals(self.scan.points, faces, _SMOOTHED),
         }
         for name, value in made.items():
             object.__setattr__(self, name, value)
@@ -183,7 +196,10 @@ class Transfer:
         off = points - landed.point
         aside = off - np.einsum("kd,kd->k", off, landed.normal)[:, None] * landed.normal
         over_hole = self._on_rim(landed) & (np.linalg.norm(aside, axis=1) > RIM)
-        facing = np.einsum("kd,kd->k", normals, landed.normal) > FACING
+        corners = self._scan_normals[self.scan.triangles[landed.triangle]]
+        scans = np.einsum("kc,kcd->kd", landed.barycentric, corners)
+        cosine = np.einsum("kd,kd->k", normals, scans)
+        facing = cosine > FACING * np.linalg.norm(scans, axis=1)
         return np.asarray((landed.distance <= self.reach) & facing & ~over_hole), landed
 
     def _on_rim(self, landed: Any) -> Mask:
