@@ -50,8 +50,8 @@ def random_posture(template: Template, pose: Pose, seed: int, shapes: float = 1.
     """A body of random shape in ``pose``, every bone attached to its parent at the joint.
 
     The shape is `random_blend`'s of standard deviation ``shapes``; the size is normal with 4 %.
-    Drawn again while an arm would pass through the body. Of a supine posture only the bones tell; the table that flattens the
-    back is `synthetic_scan`'s.
+    Drawn again while an arm would pass through the body. A supine posture is told by its bones
+    alone; the table that flattens the back is `synthetic_scan`'s.
 
     Raises:
         InputError: an unknown pose, ``shapes`` below 0.
