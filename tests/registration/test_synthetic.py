@@ -12,7 +12,6 @@ from supple.registration.posture import posed
 from supple.registration.procedural import torso
 from supple.registration.synthetic import POSES, SyntheticScan, random_posture, synthetic_scan
 from supple.registration.synthetic_overlap import arms_in_body
-from supple.registration.template import Template
 from supple.surface import Surface
 
 template = cache(torso)
@@ -44,7 +43,8 @@ def test_a_random_body_keeps_its_bounds_and_its_arms_apart(pose):
     low, high = t.blendshape_bounds.T
     for seed in range(3):
         q = random_posture(t, pose, seed)
-        assert (q.blend >= low).all() and (q.blend <= high).all()
+        assert (q.blend >= low).all()
+        assert (q.blend <= high).all()
         assert np.allclose(np.linalg.det(q.rotations), 1.0)
         assert not arms_in_body(t, posed(t, q)).any()
 

@@ -85,7 +85,7 @@ def inflation(points: Floats, residuals: Floats, patch: float, assumed: float,
     if len(points) < 10:
         return 1.0
     found = correlated(points, residuals)
-    whole = found.areas @ found.covariance + found.own_area * found.variance
+    whole = float(found.areas @ found.covariance) + found.own_area * found.variance
     return max(whole, 1e-12) / (patch**2 * assumed**2) / max(share_free, 0.05)
 
 
@@ -104,10 +104,10 @@ def correlated(points: Floats, residuals: Floats) -> Correlogram:
     """Up to the first ring in which residuals no longer agree, at most 12 cm."""
     anchors = np.unique(np.linspace(0, len(points) - 1, _ANCHORS).astype(np.int64))
     apart = _distances(points[anchors], points)
-    ring = np.minimum((apart / _RING).astype(np.int64), int(_FAR / _RING))
-    ring[np.arange(len(anchors)), anchors] = int(_FAR / _RING)
+    rings = round(_FAR / _RING)
+    ring = np.minimum((apart / _RING).astype(np.int64), rings)
+    ring[np.arange(len(anchors)), anchors] = rings  # a point is no neighbour of itself
     products = residuals[anchors, None] * residuals
-    rings = int(round(_FAR / _RING))
     count = np.bincount(ring.ravel(), minlength=rings + 1)[:rings]
     sums = np.bincount(ring.ravel(), products.ravel(), minlength=rings + 1)[:rings]
     mean = np.where(count > 0, sums / np.maximum(count, 1), 0.0)
@@ -117,7 +117,7 @@ def correlated(points: Floats, residuals: Floats) -> Correlogram:
     own = 1 / max(per_area, 1.0)
     areas[0] = max(areas[0] - own, 0.0)
     until = int(np.argmax(np.append(mean, -1.0) <= 0))
-    return Correlogram(edges[:until] + _RING / 2, mean[:until], areas[:until],
+    return Correlogram(_RING * (np.arange(until) + 0.5), mean[:until], areas[:until],
                        float(np.mean(residuals**2)), own)  # fmt: skip
 
 
@@ -160,8 +160,7 @@ def jacobian(
 
 def _bands(rows: Floats, covariance: Floats) -> Bands:
     """Bands of points whose derivatives are ``rows`` (n, 3, p)."""
-    count, _, unknowns = rows.shape
-    spread = (rows.reshape(-1, unknowns) @ covariance).reshape(rows.shape)
+    spread = (rows.reshape(-1, rows.shape[2]) @ covariance).reshape(rows.shape)
     matrices = np.matmul(spread, np.swapaxes(rows, 1, 2))
     variances = np.maximum(np.linalg.eigvalsh(matrices), 0.0)
     return Bands(matrices, np.sqrt(variances.mean(axis=1)), radius(variances, 0.95))
