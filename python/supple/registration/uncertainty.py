@@ -110,14 +110,14 @@ def correlated(points: Floats, residuals: Floats) -> Correlogram:
     products = residuals[anchors, None] * residuals
     count = np.bincount(ring.ravel(), minlength=rings + 1)[:rings]
     sums = np.bincount(ring.ravel(), products.ravel(), minlength=rings + 1)[:rings]
-    mean = np.where(count > 0, sums / np.maximum(count, 1), 0.0)
+    mean: Floats = (sums / np.maximum(count, 1)).astype(np.float64)
     edges = _RING * np.arange(rings + 1)
-    areas = np.pi * np.diff(edges**2)
+    areas: Floats = np.pi * np.diff(edges**2)
     per_area = count[1:6].sum() / len(anchors) / areas[1:6].sum()  # points a m² of skin
     own = 1 / max(per_area, 1.0)
     areas[0] = max(areas[0] - own, 0.0)
     until = int(np.argmax(np.append(mean, -1.0) <= 0))
-    return Correlogram(_RING * (np.arange(until) + 0.5), mean[:until], areas[:until],
+    return Correlogram(_RING * (0.5 + np.arange(until, dtype=np.float64)), mean[:until], areas[:until],
                        float(np.mean(residuals**2)), own)  # fmt: skip
 
 

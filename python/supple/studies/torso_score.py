@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from ..registration.template import Floats, Ints, Template
+from ..registration.template import Floats, Ints, OnSurface, Template
 from ..surface import Surface
 
 if TYPE_CHECKING:
@@ -94,16 +94,23 @@ def rim_vertices(triangles: Ints, count: int) -> npt.NDArray[np.bool_]:
 
 def _covered(found: Registration, scan: SyntheticScan, off: Floats) -> float:
     """Share of vertices, or of landmarks where vertices do not correspond, inside their band."""
-    from ..registration.uncertainty import at_landmarks, vertex_uncertainty
+    from ..registration import uncertainty
 
+    given = found.template, found.posture, found.covariance
     if found.covariance is None:
         return float("nan")
-    bands = vertex_uncertainty(found.template, found.posture, found.covariance)
     if off.ndim:
-        return float((off <= bands.radius95).mean())
-    radius = at_landmarks(found.template, bands)
-    inside = [
-        np.linalg.norm(found.landmarks[name] - scan.truth.landmarks[name]) <= radius[name]
-        for name in radius if name in scan.truth.landmarks
-    ]  # fmt: skip
-    return float(np.mean(inside))
+        return float((off <= uncertainty.vertex_uncertainty(*given).radius95).mean())
+    names = [name for name in found.template.landmarks if name in scan.truth.landmarks]
+    bands = uncertainty.uncertainty_at(*given, _joined(found.template, names))
+    apart = [found.landmarks[name] - scan.truth.landmarks[name] for name in names]
+    return float((np.linalg.norm(apart, axis=1) <= bands.radius95).mean())
+
+
+def _joined(template: Template, names: Sequence[str]) -> OnSurface:
+    """Landmarks as one set of points."""
+    parts = [template.landmarks[name] for name in names]
+    return OnSurface(
+        np.concatenate([part.triangle for part in parts]),
+        np.concatenate([part.barycentric for part in parts]),
+    )
