@@ -29,7 +29,7 @@ _PEOPLES = ("african", "asian", "caucasian")
 _FULL = "breast/female-young-averagemuscle-averageweight-maxcup-averagefirmness"
 _NIPPLE = "breast/nipple-point-incr"
 _HIPS = 0.05  #: height of the lower cut, m
-_NECK = np.array([(0.0, -0.025, 0.555), (0.0, 0.196, 0.981)])  #: a point of the cut, and its normal
+_NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])  #: a point of the cut, and its normal
 _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
 _OUTLINE = 0.15  #: of the largest displacement by a fuller cup: where the breast begins
 
