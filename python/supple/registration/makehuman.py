@@ -29,9 +29,10 @@ _PEOPLES = ("african", "asian", "caucasian")
 _FULL = "breast/female-young-averagemuscle-averageweight-maxcup-averagefirmness"
 _NIPPLE = "breast/nipple-point-incr"
 _HIPS = 0.05  #: height of the lower cut, m
-_NECK = np.array([(0.0, -0.025, 0.555), (0.0, 0.196, 0.981)])  #: a point of the cut, and its normal
+_NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])  #: a point of the cut, and its normal
 _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
-_OUTLINE = 0.15  #: of the largest displacement by a fuller cup: where the breast begins
+#: Where the breast begins: geometric mean of its bone's weight and of its move by a fuller cup.
+_OUTLINE = 0.2
 
 
 def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.021) -> Template:
@@ -83,10 +84,10 @@ def _template(base: BaseMesh, woman: Floats, half: Half) -> Template:
     weights = rig.weights(base, means, mirror)
     of_bone = {name: weights[:, k] for k, (name, _) in enumerate(BONES)}
     full, nipple = (np.linalg.norm(target(name), axis=1) for name in (_FULL, _NIPPLE))
-    level = _OUTLINE * full.max()
-    outline = skin.nearest(skin.outline(full, level, 96), closed=True)
+    breast = np.sqrt(full / full.max() * of_bone["breast_left"])
+    outline = draw.smooth_outline(skin, skin.outline(breast, _OUTLINE, 96))
     marks = draw.landmarks(skin, nipple, outline, of_bone["arm_left"])
-    inside = (full > level) & (points[:, 0] > 0)
+    inside = (breast > _OUTLINE) & (points[:, 0] > 0)
     found = shapes(target, points, mirror)
     return Template(
         points, triangles, rig.bones(base, woman, skin.at(outline).mean(axis=0)), weights,

@@ -16,20 +16,20 @@ Floats = npt.NDArray[np.float64]
 
 #: Trunk: height, half breadth, front, back (m), exponent of the superellipse.
 _TRUNK = np.array([
-    (-0.40, 0.182, -0.098, 0.118, 2.3),
-    (-0.31, 0.176, -0.106, 0.112, 2.3),
-    (-0.23, 0.160, -0.112, 0.092, 2.3),
-    (-0.15, 0.137, -0.102, 0.082, 2.3),
-    (-0.08, 0.138, -0.102, 0.084, 2.4),
-    (0.00, 0.147, -0.101, 0.095, 2.5),
-    (0.07, 0.146, -0.087, 0.102, 2.5),
-    (0.12, 0.128, -0.068, 0.102, 2.4),
-    (0.16, 0.095, -0.045, 0.094, 2.2),
-    (0.20, 0.060, -0.020, 0.084, 2.0),
+    (-0.40, 0.186, -0.096, 0.128, 2.3),
+    (-0.31, 0.177, -0.108, 0.116, 2.3),
+    (-0.23, 0.158, -0.114, 0.090, 2.35),
+    (-0.15, 0.136, -0.106, 0.077, 2.4),
+    (-0.08, 0.136, -0.103, 0.084, 2.45),
+    (0.00, 0.146, -0.098, 0.100, 2.5),
+    (0.07, 0.144, -0.084, 0.110, 2.5),
+    (0.12, 0.126, -0.064, 0.110, 2.4),
+    (0.16, 0.096, -0.042, 0.100, 2.2),
+    (0.20, 0.060, -0.018, 0.088, 2.0),
     (0.26, 0.040, -0.010, 0.070, 2.0),
 ])  # fmt: skip
 
-SHOULDER = np.array([0.165, 0.022, 0.118])  #: centre of the left humeral head, m
+SHOULDER = np.array([0.162, 0.024, 0.110])  #: centre of the left humeral head, m
 ARM = np.array([0.44, 0.02, -0.90]) / np.linalg.norm([0.44, 0.02, -0.90])  #: along the left arm
 NECK = np.array([0.0, 0.040, 0.150])  #: base of the neck, m
 NECK_AXIS = np.array([0.0, -0.17, 0.985]) / np.linalg.norm([0.17, 0.985])
@@ -49,7 +49,7 @@ def level(points: Floats) -> Floats:
     body = smooth_min(trunk(p), shoulder_girdle(p), 0.05)
     body = smooth_min(body, neck(p), 0.035)
     body = smooth_min(body, arm(p), 0.040)
-    return smooth_min(body, breast(p), 0.022)
+    return smooth_min(body, *breast(p))
 
 
 def slope(points: Floats, step: float = 1e-5) -> Floats:
@@ -65,7 +65,7 @@ def normals(points: Floats) -> Floats:
     return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
 
 
-def smooth_min(a: Floats, b: Floats, width: float) -> Floats:
+def smooth_min(a: Floats, b: Floats, width: Floats | float) -> Floats:
     """The lesser of both, twice differentiable where they are within ``width`` of each other."""
     near = np.maximum(width - np.abs(a - b), 0.0) / width
     return np.asarray(np.minimum(a, b) - near**3 * (width / 6))
@@ -95,8 +95,8 @@ def _profile():
 
 def shoulder_girdle(p: Floats) -> Floats:
     """From the neck's base over the clavicle and the trapezius to the acromion."""
-    collar = cone(p, (0.025, 0.030, 0.135), (0.150, 0.028, 0.122), 0.046, 0.042)
-    slope = cone(p, (0.015, 0.048, 0.215), (0.125, 0.045, 0.138), 0.030, 0.030)
+    collar = cone(p, (0.020, 0.030, 0.132), (0.150, 0.028, 0.116), 0.046, 0.042)
+    slope = cone(p, (0.010, 0.052, 0.222), (0.140, 0.042, 0.126), 0.030, 0.034)
     return smooth_min(collar, slope, 0.04)
 
 
@@ -108,17 +108,23 @@ def neck(p: Floats) -> Floats:
 def arm(p: Floats) -> Floats:
     """Deltoid and upper arm, |x| taken."""
     upper = cone(p, tuple(SHOULDER), tuple(SHOULDER + 0.30 * ARM), 0.048, 0.041)
-    deltoid = ellipsoid(p - (SHOULDER + 0.03 * ARM), (0.053, 0.055, 0.075))
+    deltoid = ellipsoid(p - (SHOULDER + 0.035 * ARM), (0.050, 0.054, 0.080))
     return smooth_min(upper, deltoid, 0.03)
 
 
-def breast(p: Floats) -> Floats:
-    """A full lower pole, a flatter slope above, areola and nipple."""
+def breast(p: Floats) -> tuple[Floats, Floats]:
+    """A full lower pole, a flatter slope above, areola and nipple; how softly it joins the chest.
+
+    The lower fold is sharp; above, the breast fades into the chest.
+    """
     q = (p - BREAST) @ BREAST_AXES.T
-    pole = ellipsoid(q - (0.004, -0.004, 0.0), (0.062, 0.060, 0.052))
-    slope = ellipsoid(q - (-0.004, 0.045, -0.012), (0.055, 0.070, 0.040))
-    mound = smooth_min(pole, slope, 0.03)
-    return smooth_min(mound, np.linalg.norm(q - NIPPLE, axis=1) - 0.006, 0.010)
+    pole = ellipsoid(q - (0.002, -0.006, 0.0), (0.061, 0.058, 0.051))
+    slope = ellipsoid(q - (-0.002, 0.030, -0.026), (0.058, 0.085, 0.050))
+    mound = smooth_min(pole, slope, 0.05)
+    areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
+    nipple = np.linalg.norm(q - NIPPLE, axis=1) - 0.0055
+    softness = 0.016 + 0.05 / (1 + np.exp(-(q[:, 1] - 0.025) / 0.018))
+    return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
 
 
 def cone(p: Floats, a: tuple[float, ...], b: tuple[float, ...], ra: float, rb: float) -> Floats:

@@ -52,7 +52,7 @@ def regions(points: Floats) -> dict[str, npt.NDArray[np.bool_]]:
     on_left, on_right = points[:, 0] > 0, points[:, 0] < 0
     sternum = front & (p[:, 0] < 0.025) & (p[:, 2] < NOTCH) & (p[:, 2] > XIPHOID)
     return {"breast_left": breast & front & on_left, "breast_right": breast & front & on_right,
-            "sternum": sternum, "back": (n[:, 1] > 0.25) & ~arm & ~neck,
+            "sternum": sternum, "back": (n[:, 1] > 0.25) & (p[:, 1] > 0.02) & ~arm & ~neck,
             "abdomen": front & (p[:, 2] < -0.09), "neck": neck,
             "arm_left": arm & on_left, "arm_right": arm & on_right}  # fmt: skip
 
