@@ -6,6 +6,7 @@ Source: VTK file formats, https://docs.vtk.org/en/latest/design_documents/VTKFil
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,7 @@ def fan(offsets: Ints, ids: Ints) -> Ints:
 def strips(offsets: Ints, ids: Ints) -> Ints:
     """Triangles (t, 3) of triangle strips, whose every second one is turned."""
     parts = [np.empty((0, 3), dtype=np.int64)]
-    for a, b in zip(offsets[:-1], offsets[1:], strict=True):
+    for a, b in pairwise(offsets):
         strip = np.stack([ids[a : b - 2], ids[a + 1 : b - 1], ids[a + 2 : b]], axis=1)
         strip[1::2] = strip[1::2, [1, 0, 2]]
         parts.append(strip)

@@ -17,6 +17,9 @@ from supple.files import replacing
 _SCHEMA = ("https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/"
            "Resources/Schema/markups-schema-v1.0.3.json#")  # fmt: skip
 
+#: Columns of a ``.fcsv`` file.
+_COLUMNS = "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
+
 
 def write_landmarks(path: str | Path, points: Mapping[str, npt.ArrayLike]) -> Path:
     """Write landmarks (3,) m, LPS, by name, whole or not at all.
@@ -46,7 +49,7 @@ def write_landmarks(path: str | Path, points: Mapping[str, npt.ArrayLike]) -> Pa
 
 def _fcsv(rows: dict[str, list[float]]) -> str:
     lines = ["# Markups fiducial file version = 4.11", "# CoordinateSystem = LPS",
-             "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"]  # fmt: skip
+             _COLUMNS]  # fmt: skip
     lines += [f"{k},{x!r},{y!r},{z!r},0,0,0,1,1,1,0,{name},,"
               for k, (name, (x, y, z)) in enumerate(rows.items())]  # fmt: skip
     return "\n".join([*lines, ""])
