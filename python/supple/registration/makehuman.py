@@ -35,7 +35,7 @@ _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
 _OUTLINE = 0.2
 
 
-def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.021) -> Template:
+def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0175) -> Template:
     """The torso of an average young woman, 1.59 m tall.
 
     Args:
@@ -43,7 +43,7 @@ def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.021) -> Tem
         mpfb: laid out as MPFB 2's data, for its table of mirrored vertices; without it they are
             found by place.
         spacing: longest edge on the breasts, m, as far as one division goes; twice that elsewhere.
-            0.021 gives about 2,200 vertices.
+            0.0175 gives about 2,200 vertices.
 
     Raises:
         InputError: a file is missing or not MakeHuman's.
@@ -88,9 +88,10 @@ def _template(base: BaseMesh, woman: Floats, half: Half) -> Template:
     outline = draw.smooth_outline(skin, skin.outline(breast, _OUTLINE, 96))
     marks = draw.landmarks(skin, nipple, outline, of_bone["arm_left"])
     inside = (breast > _OUTLINE) & (points[:, 0] > 0)
-    found = shapes(target, points, mirror)
+    bones = rig.bones(base, woman, skin.at(outline).mean(axis=0))
+    found = shapes(target, points, mirror, rig.moves(points, weights, bones))
     return Template(
-        points, triangles, rig.bones(base, woman, skin.at(outline).mean(axis=0)), weights,
+        points, triangles, bones, weights,
         found.moved, found.names, found.bounds, marks, draw.curves(skin, marks, outline),
         draw.regions(skin, of_bone, inside, marks), mirror, "makehuman", SOURCE,
     )  # fmt: skip
