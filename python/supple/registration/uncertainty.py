@@ -117,7 +117,8 @@ def correlated(points: Floats, residuals: Floats) -> Correlogram:
     own = 1 / max(per_area, 1.0)
     areas[0] = max(areas[0] - own, 0.0)
     until = int(np.argmax(np.append(mean, -1.0) <= 0))
-    return Correlogram(_RING * (0.5 + np.arange(until, dtype=np.float64)), mean[:until], areas[:until],
+    middles: Floats = _RING * (0.5 + np.arange(until, dtype=np.float64))
+    return Correlogram(middles, mean[:until], areas[:until],
                        float(np.mean(residuals**2)), own)  # fmt: skip
 
 
