@@ -9,4 +9,5 @@ PYBIND11_MODULE(_core, module) {
   bind_blas(module);
   bind_multigrid(module);
   bind_linear(module);
+  bind_rig(module);
 }

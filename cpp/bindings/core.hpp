@@ -27,3 +27,4 @@ void bind_closest_point(py::module_& module);
 void bind_blas(py::module_& module);
 void bind_multigrid(py::module_& module);
 void bind_linear(py::module_& module);
+void bind_rig(py::module_& module);

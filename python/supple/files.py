@@ -74,4 +74,6 @@ def parsed_xml(text: str | bytes, source: object) -> Element:
     try:
         return ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        raise InputError(f"{source} is no XML that can be read ({error}); export it again.") from None
+        raise InputError(
+            f"{source} is no XML that can be read ({error}); export it again."
+        ) from None

@@ -6,6 +6,7 @@ Source: VTK file formats, https://docs.vtk.org/en/latest/design_documents/VTKFil
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,7 @@ def fan(offsets: Ints, ids: Ints) -> Ints:
 def strips(offsets: Ints, ids: Ints) -> Ints:
     """Triangles (t, 3) of triangle strips, whose every second one is turned."""
     parts = [np.empty((0, 3), dtype=np.int64)]
-    for a, b in zip(offsets[:-1], offsets[1:], strict=True):
+    for a, b in pairwise(offsets):
         strip = np.stack([ids[a : b - 2], ids[a + 1 : b - 1], ids[a + 2 : b]], axis=1)
         strip[1::2] = strip[1::2, [1, 0, 2]]
         parts.append(strip)
@@ -90,11 +91,14 @@ class _Legacy:
         self.data, self.at = data, len(data) - len(lines[3])
 
     def read(self) -> tuple[Floats, Ints]:
-        points, parts = np.empty((0, 3)), [np.empty((0, 3), dtype=np.int64)]
+        points: Floats = np.empty((0, 3))
+        parts = [np.empty((0, 3), dtype=np.int64)]
         while (words := self._line()) is not None:
             name = words[0].upper() if words else ""
             if name == "POINTS":
-                points = self._numbers(3 * int(words[1]), words[2]).reshape(-1, 3)
+                points = (
+                    self._numbers(3 * int(words[1]), words[2]).reshape(-1, 3).astype(np.float64)
+                )
             elif name in _CELLS:
                 offsets, ids = self._cells(int(words[1]), int(words[2]))
                 if name == "POLYGONS":
@@ -103,7 +107,7 @@ class _Legacy:
                     parts.append(strips(offsets, ids))
             elif name in ("POINT_DATA", "CELL_DATA"):
                 break
-        return points.astype(np.float64), np.vstack(parts)
+        return points, np.vstack(parts)
 
     def _line(self) -> list[str] | None:
         """The words of the next line; None at the end."""

@@ -29,12 +29,13 @@ _PEOPLES = ("african", "asian", "caucasian")
 _FULL = "breast/female-young-averagemuscle-averageweight-maxcup-averagefirmness"
 _NIPPLE = "breast/nipple-point-incr"
 _HIPS = 0.05  #: height of the lower cut, m
-_NECK = np.array([(0.0, -0.025, 0.555), (0.0, 0.196, 0.981)])  #: a point of the cut, and its normal
+_NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])  #: a point of the cut, and its normal
 _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
-_OUTLINE = 0.15  #: of the largest displacement by a fuller cup: where the breast begins
+#: Where the breast begins: geometric mean of its bone's weight and of its move by a fuller cup.
+_OUTLINE = 0.2
 
 
-def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.021) -> Template:
+def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0175) -> Template:
     """The torso of an average young woman, 1.59 m tall.
 
     Args:
@@ -42,7 +43,7 @@ def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.021) -> Tem
         mpfb: laid out as MPFB 2's data, for its table of mirrored vertices; without it they are
             found by place.
         spacing: longest edge on the breasts, m, as far as one division goes; twice that elsewhere.
-            0.021 gives about 2,200 vertices.
+            0.0175 gives about 2,200 vertices.
 
     Raises:
         InputError: a file is missing or not MakeHuman's.
@@ -83,13 +84,14 @@ def _template(base: BaseMesh, woman: Floats, half: Half) -> Template:
     weights = rig.weights(base, means, mirror)
     of_bone = {name: weights[:, k] for k, (name, _) in enumerate(BONES)}
     full, nipple = (np.linalg.norm(target(name), axis=1) for name in (_FULL, _NIPPLE))
-    level = _OUTLINE * full.max()
-    outline = skin.nearest(skin.outline(full, level, 96), closed=True)
+    breast = np.sqrt(full / full.max() * of_bone["breast_left"])
+    outline = draw.smooth_outline(skin, skin.outline(breast, _OUTLINE, 96))
     marks = draw.landmarks(skin, nipple, outline, of_bone["arm_left"])
-    inside = (full > level) & (points[:, 0] > 0)
-    found = shapes(target, points, mirror)
+    inside = (breast > _OUTLINE) & (points[:, 0] > 0)
+    bones = rig.bones(base, woman, skin.at(outline).mean(axis=0))
+    found = shapes(target, points, mirror, rig.moves(points, weights, bones))
     return Template(
-        points, triangles, rig.bones(base, woman, skin.at(outline).mean(axis=0)), weights,
+        points, triangles, bones, weights,
         found.moved, found.names, found.bounds, marks, draw.curves(skin, marks, outline),
         draw.regions(skin, of_bone, inside, marks), mirror, "makehuman", SOURCE,
     )  # fmt: skip

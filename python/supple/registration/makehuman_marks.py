@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from supple.errors import MeshError
 from supple.registration.template import OnSurface
 
 Floats = npt.NDArray[np.float64]
@@ -45,6 +46,12 @@ class Skin:
     def at(self, marks: OnSurface) -> Floats:
         return marks.at(self.points, self.triangles)
 
+    def normals(self) -> Floats:
+        """Unit outward normals (t, 3)."""
+        a, b, c = (self.points[self.triangles[:, i]] for i in range(3))
+        cross = np.cross(b - a, c - a)
+        return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
+
     def middle(self, front: bool) -> Floats:
         """The profile (m, 3) m in x = 0, from below to the neck."""
         on = self.points[np.abs(self.points[:, 0]) < 1e-9]
@@ -59,9 +66,12 @@ class Skin:
         return np.stack([np.zeros(count), np.interp(z, line[:, 2], line[:, 1]), z], axis=1)
 
     def outline(self, field: Floats, level: float, count: int) -> Floats:
-        """The closed line (count, 3) m on the left half where ``field`` (n,) is ``level``.
+        """The longest line (count, 3) m on the left half where ``field`` (n,) is ``level``.
 
-        It runs evenly in length, from its lowest point towards the midline.
+        It is closed and runs evenly in length, from its lowest point towards the midline.
+
+        Raises:
+            MeshError: no such line closes.
         """
         half = self.triangles[: len(self.triangles) // 2]
         ends: dict[tuple[int, int], list[tuple[int, int]]] = {}
@@ -73,6 +83,8 @@ class Skin:
             for one, other in (crossed, crossed[::-1]):
                 ends.setdefault(one, []).append(other)
         loops = _loops(ends)
+        if not loops:
+            raise MeshError("the targets must move a breast with a closed outline; take them unchanged.")
         edges = np.array(max(loops, key=len))
         share = (level - field[edges[:, 0]]) / (field[edges[:, 1]] - field[edges[:, 0]])
         line = self.points[edges[:, 0]] * (1 - share[:, None])
@@ -104,43 +116,57 @@ def _even(line: Floats, count: int) -> Floats:
     return np.stack([np.interp(s, length, column) for column in line.T], axis=1)
 
 
+def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
+    """A closed line (k, 3) m without the mesh's zigzag: its first ``waves`` harmonics, on the skin.
+
+    Its x stays that of the left half.
+    """
+    spectrum = np.fft.rfft(line, axis=0)
+    spectrum[waves + 1 :] = 0
+    smooth = _even(np.fft.irfft(spectrum, len(line), axis=0), len(line))
+    return skin.nearest(smooth, closed=True)
+
+
 def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> dict[str, OnSurface]:
-    """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight."""
+    """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight.
+
+    Nipple: the middle of what moves with the nipple's tip. Medial, lateral, inferior: the ends of
+    the breast's outline. Xiphoid: on the profile at the height of the lower folds.
+    """
     around = skin.at(outline)
-    tip = skin.points[int(np.argmax(np.where(skin.points[:, 0] > 0, nipple, 0)))]
+    tip = np.where(skin.points[:, 0] > 0, nipple, 0.0)
+    tip = np.where(tip > 0.8 * tip.max(), tip, 0.0)
     marks = {
-        "nipple": skin.nearest(tip),
+        "nipple": skin.nearest(tip @ skin.points / tip.sum()),
         "axilla": skin.nearest(_axilla(skin, arm)),
         "breast_medial": skin.nearest(around[around[:, 0].argmin()]),
         "breast_lateral": skin.nearest(around[around[:, 0].argmax()]),
         "breast_inferior": skin.nearest(around[around[:, 2].argmin()]),
     }
-    notch = _notch(skin)
-    result = {"sternal_notch": skin.nearest(notch),
+    result = {"sternal_notch": skin.nearest(_notch(skin)),
               "xiphoid": skin.nearest(skin.profile(*[around[:, 2].min()] * 2, 1))}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
 
 
-def _notch(skin: Skin) -> Floats:
-    """Where the profile turns most sharply from the chest to the neck."""
-    line = skin.profile(*(skin.middle(front=True)[[0, -1], 2]), 2001)
-    line = line[line[:, 2] > np.quantile(line[:, 2], 0.7)]
-    slope = np.gradient(line[:, 1], line[:, 2])
-    turn = np.gradient(np.arctan(slope), line[:, 2])
-    width = 120
-    smooth = np.convolve(turn, np.ones(width) / width, mode="valid")
-    return line[int(np.argmin(smooth)) + width // 2]
+def _notch(skin: Skin, window: float = 0.02) -> Floats:
+    """Where the profile turns most from the chest to the neck within ``window`` m of height."""
+    line = skin.middle(front=True)
+    z = np.arange(np.quantile(line[:, 2], 0.5), line[-1, 2] - window, 1e-4)
+    angle = np.arctan(np.gradient(np.interp(z, line[:, 2], line[:, 1]), z))
+    steps = round(window / 1e-4)
+    turn = angle[steps:] - angle[:-steps]
+    height = z[int(np.argmin(turn)) + steps // 2]
+    return skin.profile(height, height, 1)[0]
 
 
 def _axilla(skin: Skin, arm: Floats) -> Floats:
-    """The anterior axillary fold: in front of the armpit, where arm and chest share the skin."""
-    p = skin.points
-    pit = p[(p[:, 0] > 0) & (arm > 0.2) & (arm < 0.8)]
-    pit = pit[pit[:, 2].argmin()]
-    near = (p[:, 0] > 0) & (np.abs(p[:, 2] - pit[2]) < 0.02) & (np.abs(p[:, 0] - pit[0]) < 0.02)
-    return p[near][p[near][:, 1].argmin()]
+    """The anterior axillary fold: the lowest place of the front where arm and chest share evenly."""
+    line = skin.outline(arm, 0.45, 400)
+    normal = skin.normals()[skin.nearest(line).triangle]
+    front = line[normal[:, 1] < -0.5]
+    return front[front[:, 2].argmin()]
 
 
 def curves(skin: Skin, marks: dict[str, OnSurface], outline: OnSurface) -> dict[str, OnSurface]:

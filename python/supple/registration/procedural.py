@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.registration import procedural_marks as marks
+from supple.registration.procedural_marks import marks, regions
 from supple.registration.procedural_mesh import skin
 from supple.registration.procedural_rig import bones, weights
 from supple.registration.procedural_shapes import BOUND, blendshapes
@@ -25,7 +25,8 @@ def torso(spacing: float = 0.025) -> Template:
         InputError: another spacing.
     """
     made = skin(spacing)
-    shapes, names = blendshapes(made.points)
+    landmarks, curves = marks(made)
+    shapes, names = blendshapes(made)
     return Template(
         points=made.points,
         triangles=made.triangles,
@@ -34,9 +35,9 @@ def torso(spacing: float = 0.025) -> Template:
         blendshapes=shapes,
         blendshape_names=names,
         blendshape_bounds=np.tile([-BOUND, BOUND], (len(names), 1)),
-        landmarks=marks.landmarks(made),
-        curves=marks.curves(made),
-        regions=marks.regions(made.points),
+        landmarks=landmarks,
+        curves=curves,
+        regions=regions(made.points),
         mirror=made.mirror,
         name="procedural torso",
         source="Supple; made by code after published anthropometry.",

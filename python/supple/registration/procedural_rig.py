@@ -37,7 +37,9 @@ def weights(points: Floats) -> Floats:
     """(n, 9) of the bones at ``points`` (n, 3) m: ≥ 0, rows sum to 1, smooth in the place."""
     p = left(points)
     arm, rest = _split(np.ones(len(p)), arm_part(p))
-    shoulder, rest = _split(rest, smooth((p[:, 0] - 0.045) / 0.09) * smooth((p[:, 2] - 0.05) / 0.08))
+    shoulder, rest = _split(
+        rest, smooth((p[:, 0] - 0.045) / 0.09) * smooth((p[:, 2] - 0.05) / 0.08)
+    )
     neck, rest = _split(rest, smooth(((p - body.NECK) @ body.NECK_AXIS + 0.005) / 0.08))
     breast, rest = _split(rest, smooth((1.15 - breast_radius(p)) / 0.9))
     chest, abdomen = _split(rest, smooth((p[:, 2] + 0.18) / 0.15))

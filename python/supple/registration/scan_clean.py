@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from supple.errors import InputError
 from supple.registration.scan_sheets import outer_sheet
-from supple.registration.scan_topology import consistent, pieces
+from supple.registration.scan_topology import consistent, half_edges, pieces
 from supple.surface import Surface, flat
 
 Floats = npt.NDArray[np.float64]
@@ -26,7 +26,7 @@ LEAST, LOST = 200, 0.01
 _EXTENT = (0.1, 3.0)
 #: Points closer than this are one, m: the least step that files of four decimals of a mm hold.
 _WELD = 1e-7
-#: |∫ n·(x - c) dA| / ∫ |x - c| dA above which it is sure which side is outside.
+#: |∫ n·(x - c) dA| over area and size above which it is sure which side is outside.
 _SURE = 0.05
 
 
@@ -52,7 +52,7 @@ def tidy(points: npt.ArrayLike, triangles: npt.ArrayLike, source: str = "the sca
         raise InputError(f"{source} has triangles with corners outside its {len(xyz)} points; "
                          "export it again.")  # fmt: skip
     said = []
-    good = np.isfinite(xyz).all(axis=1)
+    good = np.asarray(np.isfinite(xyz).all(axis=1))
     if not good.all():
         lost = int((~good).sum())
         if lost > LOST * len(xyz):
@@ -99,47 +99,61 @@ def clean(surface: Surface) -> tuple[Surface, list[str]]:
 
 def _mended(points: Floats, triangles: Ints) -> tuple[Ints, list[str]]:
     said = []
-    flip = consistent(triangles, len(points))
+    edges = half_edges(triangles, len(points))
+    flip = consistent(triangles, edges)
     if flip.any():
         said.append(f"{int(flip.sum())} triangles disagreed with their neighbours on which side "
                     "is outside: turned.")  # fmt: skip
         triangles = turned(triangles, flip)
-    of, count = pieces(triangles, len(points))
-    keep = outer_sheet(points, triangles, of)
+    of, count = pieces(edges)
+    middle, normal = _middles(points, triangles)
+    keep = outer_sheet(points, triangles, of, normal)
     if not keep.all():
         said.append("The scan has an inner and an outer wall: the outer is kept, "
                     f"{int(keep.sum())} of {len(keep)} triangles.")  # fmt: skip
-        triangles, of = triangles[keep], of[keep]
-    sides, area = outwardness(points, triangles, of, count)
+        triangles, middle, normal = triangles[keep], middle[keep], normal[keep]
+    piece = of[triangles[:, 0]]
+    sides, area = _outwardness(middle, normal, piece, count)
     if (sides[area > 0.05 * area.sum()] < -_SURE).any():
         said.append("The triangles faced inward: turned inside out.")
-        triangles = turned(triangles, (sides < -_SURE)[of])
-    share = float(area.max() / area.sum())
-    several = int((area > 0).sum())
+        triangles = turned(triangles, (sides < -_SURE)[piece])
+    share, several = float(area.max() / area.sum()), int((area > 0).sum())
     if several > 1 and share < 0.98:
         said.append(f"The scan is in {several} pieces; the largest is {share:.0%} of its area.")
     return triangles, said
 
 
-def outwardness(
-    points: Floats, triangles: Ints, of: Ints, count: int
-) -> tuple[Floats, Floats]:
-    """Of each piece, whether its normals point outward (1) or inward (-1), and its area (m²).
+def _middles(points: Floats, triangles: Ints) -> tuple[Floats, Floats]:
+    """Middle (t, 3) of each triangle, m, and its normal (t, 3) as long as its area, m²."""
+    x = np.ascontiguousarray(points.T)
+    a, b, c = (x[:, ids] for ids in np.ascontiguousarray(triangles.T))
+    middle = (a + b + c) / 3
+    b -= a
+    c -= a
+    normal = np.empty_like(a)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        normal[i] = (b[j] * c[k] - b[k] * c[j]) / 2
+    return middle.T, normal.T
 
-    ∫ n·(x - c) dA over ∫ |x - c| dA, where c is the middle of the piece: for a closed piece three
-    times its volume, and of the right sign for an open one that bulges, as every side of a body.
+
+def _outwardness(middle: Floats, normal: Floats, of: Ints, count: int) -> tuple[Floats, Floats]:
+    """Of each piece, whether its normals point outward (> 0) or inward, and its area (m²).
+
+    ∫ n·(x - c) dA over its area and size, where c is the middle of the piece: for a closed piece
+    three times its volume, and of the right sign for an open one that bulges, as each side of a
+    body does.
     """
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a) / 2
     area = np.sqrt(np.einsum("td,td->t", normal, normal))
     total = np.bincount(of, area, count)
     safe = np.maximum(total, 1e-30)
-    middle = (a + b + c) / 3
-    centre = np.stack([np.bincount(of, area * m, count) for m in middle.T], 1) / safe[:, None]
-    arm = middle - centre[of]
-    flow = np.bincount(of, np.einsum("td,td->t", normal, arm), count)
-    reach = np.bincount(of, area * np.sqrt(np.einsum("td,td->t", arm, arm)), count)
-    return flow / np.maximum(reach, 1e-30), total
+    first = np.stack([np.bincount(of, area * m, count) for m in middle.T], 1) / safe[:, None]
+    flux = np.stack([np.bincount(of, n, count) for n in normal.T], 1)
+    flow = np.bincount(of, np.einsum("td,td->t", normal, middle), count)
+    flow -= np.einsum("pd,pd->p", flux, first)
+    second = np.bincount(of, area * np.einsum("td,td->t", middle, middle), count) / safe
+    size = np.sqrt(np.maximum(second - np.einsum("pd,pd->p", first, first), 1e-30))
+    return np.asarray(flow / (safe * size)), np.asarray(total, dtype=np.float64)
 
 
 def turned(triangles: Ints, flip: npt.NDArray[np.bool_]) -> Ints:
@@ -163,18 +177,20 @@ def _welded(points: Floats, triangles: Ints) -> tuple[Floats, Ints, list[str]]:
     """Without points that coincide; a scan of which none do is handed back as it is."""
     at = np.rint((points - points.min(axis=0)) / _WELD).astype(np.int64)
     key = (at[:, 0] * 73856093) ^ (at[:, 1] * 19349663) ^ (at[:, 2] * 83492791)
-    order = np.argsort(key, kind="stable")
-    same = np.zeros(len(points), dtype=bool)
-    same[1:] = (np.diff(key[order]) == 0) & (np.diff(at[order], axis=0) == 0).all(axis=1)
-    doubles = int(same.sum())
-    if not doubles:
+    ranked = np.sort(key)
+    if not (ranked[1:] == ranked[:-1]).any():
         return points, triangles, []
-    first = order[~same]
+    order = np.lexsort((at[:, 2], at[:, 1], at[:, 0]))
+    same = np.zeros(len(points), dtype=bool)
+    same[1:] = (np.diff(at[order], axis=0) == 0).all(axis=1)
+    if not same.any():
+        return points, triangles, []
     group = np.empty(len(points), dtype=np.int64)
     group[order] = np.cumsum(~same) - 1
-    points, triangles = points[first], group[triangles]
+    points, triangles = points[order[~same]], group[triangles]
     triangles = triangles[~flat(points, triangles)]
-    return points, triangles, [f"{doubles} points stood at the place of another: joined."]
+    said = f"{int(same.sum())} points stood at the place of another: joined."
+    return points, triangles, [said]
 
 
 def _used(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:

@@ -76,6 +76,7 @@ def synthetic_scan(
     template: Template, posture: Posture, seed: int, *, points: int = 100_000,
     noise: float = 2e-3, missing: float = 0.3, clutter: float = 0.05, rotation: float = 45.0,
     view: View = "around", triangles: bool = True, press: float = 0.0,
+    motion: tuple[Floats, Floats] | None = None,
 ) -> SyntheticScan:  # fmt: skip
     """A scan of ``template`` in ``posture``.
 
@@ -85,10 +86,12 @@ def synthetic_scan(
         noise: m, standard deviation along the rays, half its variance correlated over 12 mm.
         missing: share of the skin that the view shows and the scan lacks: hidden, or in holes.
         clutter: share of the points that are no skin: table or chair, blobs, speckles.
-        rotation: degrees, the largest angle of the rigid motion that carries the scan away.
+        rotation: degrees, the largest angle of the rigid motion that carries the scan away by up
+            to 0.8 m an axis; 0: it stays where it is.
         view: cameras all around, or in front (−y) only.
         triangles: a mesh by camera; otherwise a cloud of points.
         press: m, how deep a table presses the back (+y) flat.
+        motion: R (3, 3) and t (3,) m of the rigid motion, in place of a random one.
 
     Raises:
         InputError: numbers out of range; more hidden than may be missing is no error.
@@ -106,13 +109,17 @@ def synthetic_scan(
     samples = Samples.joined(skin, others).of(kept)
     measured = noisy(cameras, samples.points, found[kept], noise, random)
     faces = triangulated(cameras, measured, found[kept]) if triangles else np.empty((0, 3), int)
-    R = turned(random, random.uniform(0.0, rotation))
-    t = random.uniform(-_AWAY, _AWAY, 3)
+    R, t = motion or _carried(rotation, random)
     even = random.choice(np.flatnonzero(shown), min(20_000, int(shown.sum())), replace=False)
     truth = _truth(template, posture, body, R, t, skin.of(even))
     return SyntheticScan(
         Surface(measured @ R.T + t, faces), kept < len(skin.points), samples.points @ R.T + t, truth
     )
+
+
+def _carried(rotation: float, random: Generator) -> tuple[Floats, Floats]:
+    R = turned(random, random.uniform(0.0, rotation))
+    return R, random.uniform(-_AWAY, _AWAY, 3) * (rotation > 0)
 
 
 def pressed(points: Floats, depth: float) -> Floats:

@@ -12,13 +12,12 @@ from numpy.random import Generator
 from supple.errors import ConvergenceError, InputError
 from supple.registration.posture import Posture, posed
 from supple.registration.synthetic_overlap import arms_in_body
+from supple.registration.synthetic_shape import random_blend
 from supple.registration.template import Template
 
 Floats = npt.NDArray[np.float64]
 Pose = Literal["standing", "supine", "arms_up", "tilted"]
 POSES: tuple[Pose, ...] = get_args(Pose)
-#: Correlation of the shapes of a pair: bodies are nearly symmetric.
-_ALIKE = 0.9
 _TRIES = 200
 
 
@@ -50,10 +49,9 @@ _HABITS: dict[str, _Habit] = {
 def random_posture(template: Template, pose: Pose, seed: int, shapes: float = 1.0) -> Posture:
     """A body of random shape in ``pose``, every bone attached to its parent at the joint.
 
-    Blend coefficients are normal with standard deviation ``shapes``, cut at their bounds, those
-    of a left and right pair alike; the size is normal with 4 %. Drawn again while an arm would
-    pass through the body. Of a supine posture only the bones tell; the table that flattens the
-    back is `synthetic_scan`'s.
+    The shape is `random_blend`'s of standard deviation ``shapes``; the size is normal with 4 %.
+    Drawn again while an arm would pass through the body. A supine posture is told by its bones
+    alone; the table that flattens the back is `synthetic_scan`'s.
 
     Raises:
         InputError: an unknown pose, ``shapes`` below 0.
@@ -86,30 +84,6 @@ def attached(template: Template, rotations: Floats, scales: Floats, blend: Float
             arm = scales[parent] * (joints[k] - joints[parent])
             shifts[k] = rotations[parent] @ arm + joints[parent] + shifts[parent] - joints[k]
     return Posture(rotations, shifts, scales, blend)
-
-
-def random_blend(template: Template, random: Generator, sd: float) -> Floats:
-    """Coefficients (A,), normal cut at their bounds, those of left and right alike."""
-    names = {name: i for i, name in enumerate(template.blendshape_names)}
-    low, high = template.blendshape_bounds.T
-    blend = _cut_normal(random, sd, low, high)
-    for name, i in names.items():
-        j = names.get(name[: -len("_left")] + "_right") if name.endswith("_left") else None
-        if j is not None:
-            both = _ALIKE * blend[i] + np.sqrt(1 - _ALIKE**2) * blend[j]
-            blend[j] = np.clip(both, low[j], high[j])
-    return blend
-
-
-def _cut_normal(random: Generator, sd: float, low: Floats, high: Floats) -> Floats:
-    """Normal numbers (A,) drawn again where they leave their bounds."""
-    drawn = sd * random.normal(size=len(low))
-    for _ in range(100):
-        out = (drawn < low) | (drawn > high)
-        if not out.any():
-            return drawn
-        drawn[out] = sd * random.normal(size=int(out.sum()))
-    return np.clip(drawn, low, high)
 
 
 def _drawn(template: Template, habit: _Habit, random: Generator, shapes: float) -> Posture:

@@ -1,0 +1,190 @@
+#include "supple/rig.hpp"
+
+#include "core.hpp"
+#include "supple/error.hpp"
+#include "supple/rig_fit.hpp"
+
+namespace {
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Eigen::VectorXd;
+using supple::Points;
+using supple::Rig;
+using supple::RigFit;
+using supple::RigFitResult;
+using supple::RigPosture;
+using supple::RowMatrix;
+
+RigPosture posture(const Array& rotations, const Points& translations, const Points& scales,
+                   const VectorXd& blend) {
+  if (rotations.ndim() != 3 || rotations.shape(1) != 3 || rotations.shape(2) != 3)
+    throw supple::ShapeError("rotations must be (K, 3, 3); give one a bone");
+  RigPosture result;
+  for (py::ssize_t k = 0; k < rotations.shape(0); ++k)
+    result.rotations.emplace_back(
+        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotations.data(k, 0, 0)));
+  for (Eigen::Index k = 0; k < translations.rows(); ++k)
+    result.translations.emplace_back(translations.row(k).transpose());
+  for (Eigen::Index k = 0; k < scales.rows(); ++k)
+    result.scales.emplace_back(scales.row(k).transpose());
+  result.blend = blend;
+  return result;
+}
+
+py::tuple arrays(const RigPosture& posture) {
+  const py::ssize_t bones = static_cast<py::ssize_t>(posture.rotations.size());
+  Array rotations({bones, py::ssize_t{3}, py::ssize_t{3}});
+  Points translations(bones, 3), scales(bones, 3);
+  for (py::ssize_t k = 0; k < bones; ++k) {
+    const std::size_t s = static_cast<std::size_t>(k);
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotations.mutable_data(k, 0, 0)) =
+        posture.rotations[s];
+    translations.row(k) = posture.translations[s].transpose();
+    scales.row(k) = posture.scales[s].transpose();
+  }
+  return py::make_tuple(rotations, translations, scales, posture.blend);
+}
+
+template <class Result, class Use>
+Result unlocked(const Use& use) {
+  const py::gil_scoped_release release;
+  return use();
+}
+
+void bind_settings(py::module_& module) {
+  using supple::Moves, supple::RigPriors, supple::RigStage, supple::RigWeights;
+  py::class_<RigWeights>(module, "RigWeights")
+      .def(py::init<>())
+      .def_readwrite("data", &RigWeights::data)
+      .def_readwrite("scale", &RigWeights::scale)
+      .def_readwrite("blendshape", &RigWeights::blendshape)
+      .def_readwrite("joint", &RigWeights::joint)
+      .def_readwrite("landmark", &RigWeights::landmark);
+  py::class_<RigPriors>(module, "RigPriors")
+      .def(py::init<>())
+      .def_readwrite("noise", &RigPriors::noise)
+      .def_readwrite("patch", &RigPriors::patch)
+      .def_readwrite("scale", &RigPriors::scale)
+      .def_readwrite("joint", &RigPriors::joint)
+      .def_readwrite("rotation", &RigPriors::rotation)
+      .def_readwrite("blend_mean", &RigPriors::blend_mean)
+      .def_readwrite("blend_precision", &RigPriors::blend_precision)
+      .def_readwrite("blend_lower", &RigPriors::blend_lower)
+      .def_readwrite("blend_upper", &RigPriors::blend_upper)
+      .def_readwrite("scale_lower", &RigPriors::scale_lower)
+      .def_readwrite("scale_upper", &RigPriors::scale_upper)
+      .def_readwrite("stiff_joints", &RigPriors::stiff_joints)
+      .def_readwrite("convex", &RigPriors::convex);
+  py::class_<RigStage>(module, "RigStage")
+      .def(py::init<>())
+      .def_property(
+          "moves", [](const RigStage& stage) { return static_cast<int>(stage.moves); },
+          [](RigStage& stage, int moves) { stage.moves = static_cast<Moves>(moves); })
+      .def_readwrite("iterations", &RigStage::iterations)
+      .def_readwrite("tolerance", &RigStage::tolerance)
+      .def_readwrite("reach", &RigStage::reach)
+      .def_readwrite("loss", &RigStage::loss)
+      .def_readwrite("angle", &RigStage::angle)
+      .def_readwrite("template_share", &RigStage::template_share)
+      .def_readwrite("point_share", &RigStage::point_share)
+      .def_readwrite("every_vertex", &RigStage::every_vertex)
+      .def_readwrite("every_point", &RigStage::every_point);
+}
+
+void bind_result(py::module_& module) {
+  using supple::RigTerms, supple::ScanCloud;
+  py::class_<RigTerms>(module, "RigTerms")
+      .def_readonly("data", &RigTerms::data)
+      .def_readonly("scale", &RigTerms::scale)
+      .def_readonly("blendshape", &RigTerms::blendshape)
+      .def_readonly("joint", &RigTerms::joint)
+      .def_readonly("landmark", &RigTerms::landmark)
+      .def_readonly("rotation", &RigTerms::rotation);
+  py::class_<ScanCloud>(module, "ScanCloud")
+      .def_readonly("points", &ScanCloud::points)
+      .def_readonly("normals", &ScanCloud::normals)
+      .def_readonly("area", &ScanCloud::area)
+      .def_property_readonly("border",
+                             [](const ScanCloud& cloud) {
+                               py::array_t<bool> border(
+                                   static_cast<py::ssize_t>(cloud.border.size()));
+                               for (std::size_t i = 0; i < cloud.border.size(); ++i)
+                                 border.mutable_at(i) = cloud.border[i] != 0;
+                               return border;
+                             })
+      .def_readonly("oriented", &ScanCloud::oriented);
+  py::class_<RigFitResult>(module, "RigFitResult")
+      .def_property_readonly("posture",
+                             [](const RigFitResult& result) { return arrays(result.posture); })
+      .def_readonly("converged", &RigFitResult::converged)
+      .def_readonly("last_step", &RigFitResult::last_step)
+      .def_readonly("iterations", &RigFitResult::iterations)
+      .def_readonly("history", &RigFitResult::history)
+      .def_readonly("stage_seconds", &RigFitResult::stage_seconds)
+      .def_readonly("terms", &RigFitResult::terms)
+      .def_readonly("data_matrix", &RigFitResult::data_matrix)
+      .def_readonly("prior_matrix", &RigFitResult::prior_matrix)
+      .def_readonly("residual_sd", &RigFitResult::residual_sd)
+      .def_readonly("patch_sd", &RigFitResult::patch_sd)
+      .def_readonly("observations", &RigFitResult::observations)
+      .def_readonly("triangle", &RigFitResult::triangle)
+      .def_readonly("barycentric", &RigFitResult::barycentric)
+      .def_readonly("distance", &RigFitResult::distance)
+      .def_readonly("used", &RigFitResult::used)
+      .def_readonly("vertex_used", &RigFitResult::vertex_used);
+}
+
+void bind_rig_itself(py::module_& module) {
+  py::class_<Rig, std::shared_ptr<Rig>>(module, "Rig")
+      .def(py::init([](const Points& points, const supple::Triangles& triangles,
+                       const Points& joints, const Eigen::VectorXi& parents,
+                       const RowMatrix& weights, const RowMatrix& blendshapes, bool dual) {
+        return std::make_shared<Rig>(
+            supple::RigArrays{points, triangles, joints, parents, weights, blendshapes},
+            dual ? supple::Skinning::DualQuaternion : supple::Skinning::Linear);
+      }))
+      .def_property_readonly("unknowns", &Rig::unknowns)
+      .def("vertices",
+           [](const Rig& rig, const Array& R, const Points& t, const Points& s, const VectorXd& b) {
+             const RigPosture at = posture(R, t, s, b);
+             return unlocked<Points>([&] { return rig.posed(at); });
+           })
+      .def("jacobian",
+           [](const Rig& rig, const Array& R, const Points& t, const Points& s, const VectorXd& b) {
+             const RigPosture at = posture(R, t, s, b);
+             return unlocked<RowMatrix>([&] { return rig.jacobian(at); });
+           })
+      .def("vertex_sd", [](const Rig& rig, const Array& R, const Points& t, const Points& s,
+                           const VectorXd& b, const Eigen::MatrixXd& covariance) {
+        const RigPosture at = posture(R, t, s, b);
+        return unlocked<VectorXd>([&] { return rig.vertex_sd(at, covariance); });
+      });
+}
+
+} // namespace
+
+void bind_rig(py::module_& module) {
+  bind_settings(module);
+  bind_result(module);
+  bind_rig_itself(module);
+  py::class_<RigFit>(module, "RigFit")
+      .def(py::init([](std::shared_ptr<Rig> rig) { return std::make_unique<RigFit>(rig); }))
+      .def(
+          "set_scan",
+          [](RigFit& fit, const Points& points, const supple::Triangles& triangles,
+             const Points& normals, double voxel, bool thin) {
+            fit.set_scan(points, triangles, normals, {voxel, thin});
+          },
+          Unlocked())
+      .def_property_readonly("scan", &RigFit::scan, py::return_value_policy::copy)
+      .def("run",
+           [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
+              const supple::RigWeights& weights, const supple::RigPriors& priors,
+              const std::vector<supple::RigStage>& stages, const Eigen::VectorXi& triangle,
+              const Points& barycentric, const Points& target, const VectorXd& sd) {
+             const RigPosture start = posture(R, t, s, b);
+             const supple::RigLandmarks landmarks{triangle, barycentric, target, sd};
+             return unlocked<RigFitResult>(
+                 [&] { return fit.run(start, weights, priors, stages, landmarks); });
+           });
+}

@@ -1,0 +1,159 @@
+#include "rig_match.hpp"
+
+#include <cmath>
+#include <Eigen/Geometry>
+#include <limits>
+
+namespace supple {
+namespace {
+
+using Vec3 = Eigen::Vector3d;
+using Index = Eigen::Index;
+constexpr double kDegree = 0.017453292519943295;
+
+/// Mean of the two normals, so that the residual vanishes for any two points of one sphere: the
+/// curvature of a surface is no residual. Zero where the normals contradict each other.
+/// Source: Rusinkiewicz (2019), A symmetric objective function for ICP, ACM TOG 38(4).
+Vec3 direction_of(const Vec3& skin, Vec3 scan, bool oriented, double cosine) {
+  if (scan.isZero(0.0)) return skin;
+  double along = skin.dot(scan);
+  if (!oriented && along < 0.0) {
+    along = -along;
+    scan = -scan;
+  }
+  return along < cosine ? Vec3(Vec3::Zero()) : Vec3((skin + scan).normalized());
+}
+
+} // namespace
+
+Matcher::Matcher(const Rig& rig) : rig_(rig), vertex_order_(PointTree(rig.points()).order()) {
+  skin_.emplace(rig.points(), rig.triangles());
+}
+
+void Matcher::set_scan(const ScanCloud& scan) {
+  scan_ = &scan;
+  tree_ = PointTree(scan.points);
+  hint_ = Eigen::VectorXi::Constant(scan.points.rows(), -1);
+}
+
+void Matcher::turn_normals(const Points& points) {
+  normals_.setZero(points.rows(), 3);
+  areas_.setZero(points.rows());
+  for (Index t = 0; t < rig_.triangles().rows(); ++t) {
+    const auto v = rig_.triangles().row(t);
+    const Vec3 a = points.row(v[0]).transpose();
+    const Vec3 cross =
+        (Vec3(points.row(v[1]).transpose()) - a).cross(Vec3(points.row(v[2]).transpose()) - a);
+    const double third = cross.norm() / 6.0;
+    for (int c = 0; c < 3; ++c) {
+      normals_.row(v[c]) += cross.transpose();
+      areas_[v[c]] += third;
+    }
+  }
+  normals_.rowwise().normalize();
+}
+
+void Matcher::match(const SkinState& state, const RigStage& stage, const RigWeights& weights,
+                    const RigPriors& priors, Pairs& pairs) {
+  skin_->refit(state.points);
+  turn_normals(state.points);
+  pairs.rows.clear();
+  pairs.area = 0.0;
+  const double patch = priors.patch * priors.noise;
+  const double weight = weights.data / (patch * patch);
+  from_scan(state, stage, weight * (1.0 - stage.template_share), pairs);
+  from_template(state, stage, weight * stage.template_share, pairs);
+}
+
+void Matcher::from_scan(const SkinState& state, const RigStage& stage, double weight,
+                        Pairs& pairs) {
+  const Index all = scan_->points.rows(), every = std::max(1, stage.every_point);
+  const Index count = (all + every - 1) / every;
+  Points query(count, 3);
+  Eigen::VectorXi hint(count);
+  for (Index i = 0; i < count; ++i) {
+    query.row(i) = scan_->points.row(i * every);
+    hint[i] = hint_[i * every];
+  }
+  const Projection hit = skin_->closest(query, hint, stage.reach);
+  pairs.triangle.setConstant(all, -1);
+  pairs.barycentric.setZero(all, 3);
+  pairs.distance.setConstant(all, std::numeric_limits<double>::quiet_NaN());
+  pairs.row_of.assign(static_cast<std::size_t>(all), -1);
+  const double cosine = std::cos(stage.angle * kDegree);
+  for (Index i = 0; i < count; ++i) {
+    const int t = hit.triangle[i];
+    if (t < 0) continue;
+    const Index p = i * every;
+    hint_[p] = t;
+    Row row;
+    Vec3 skin = Vec3::Zero();
+    bool inside = hit.feature[i] == 0;
+    for (int c = 0; c < 3; ++c) {
+      const int v = rig_.triangles()(t, c);
+      row.vertex[static_cast<std::size_t>(c)] = v;
+      row.share[static_cast<std::size_t>(c)] = hit.barycentric(i, c);
+      if (hit.barycentric(i, c) == 0.0) continue;
+      skin += hit.barycentric(i, c) * normals_.row(v).transpose();
+      inside = inside || !rig_.at_border(v);
+    }
+    row.direction =
+        direction_of(skin.normalized(), scan_->normals.row(p).transpose(), scan_->oriented, cosine);
+    if (!inside || row.direction.isZero(0.0)) continue;
+    row.target = query.row(i).transpose();
+    row.weight = weight * scan_->area[p] * static_cast<double>(every);
+    row.loss = stage.loss;
+    pairs.triangle[p] = t;
+    pairs.barycentric.row(p) = hit.barycentric.row(i);
+    pairs.distance[p] = hit.distance[i];
+    pairs.row_of[static_cast<std::size_t>(p)] = static_cast<int>(pairs.rows.size());
+    pairs.area += scan_->area[p] * static_cast<double>(every);
+    if (weight > 0.0) pairs.rows.push_back(row);
+  }
+  static_cast<void>(state);
+}
+
+void Matcher::from_template(const SkinState& state, const RigStage& stage, double weight,
+                            Pairs& pairs) {
+  pairs.vertex_row.assign(static_cast<std::size_t>(rig_.vertices()), -1);
+  if (!(weight > 0.0)) return;
+  const std::size_t every = static_cast<std::size_t>(std::max(1, stage.every_vertex));
+  const std::size_t count = (vertex_order_.size() + every - 1) / every;
+  std::vector<int> nearest(count);
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < count; ++i)
+    nearest[i] = tree_
+                     .nearest(state.points.row(vertex_order_[i * every]).transpose(),
+                              stage.reach * stage.reach)
+                     .point;
+  const double cosine = std::cos(stage.angle * kDegree);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (nearest[i] < 0) continue;
+    const int v = vertex_order_[i * every];
+    const Index p = nearest[i];
+    const Vec3 normal = scan_->normals.row(p).transpose();
+    const Vec3 offset = (state.points.row(v) - scan_->points.row(p)).transpose();
+    Row row;
+    row.direction = direction_of(normals_.row(v).transpose(), normal, scan_->oriented, cosine);
+    if (row.direction.isZero(0.0)) continue;
+    const double beside = (offset - offset.dot(row.direction) * row.direction).squaredNorm();
+    const double spacing2 = scan_->area[p]; // a point's share of the surface
+    if (beside > (scan_->border[static_cast<std::size_t>(p)] ? 0.5 : 4.0) * spacing2) continue;
+    row.vertex = {v, v, v};
+    row.share = {1.0, 0.0, 0.0};
+    row.target = scan_->points.row(p).transpose();
+    row.weight = weight * areas_[v] * static_cast<double>(every);
+    row.loss = stage.loss;
+    pairs.vertex_row[static_cast<std::size_t>(v)] = static_cast<int>(pairs.rows.size());
+    pairs.rows.push_back(row);
+    if (!(stage.point_share > 0.0)) continue;
+    const Vec3 tangent = row.direction.unitOrthogonal();
+    row.weight *= stage.point_share;
+    for (const Vec3& along : {tangent, Vec3(row.direction.cross(tangent))}) {
+      row.direction = along;
+      pairs.rows.push_back(row);
+    }
+  }
+}
+
+} // namespace supple

@@ -1,0 +1,49 @@
+/// Pairs of a posed template and a scan, both ways; private to the runtime.
+#pragma once
+
+#include <optional>
+
+#include "point_tree.hpp"
+#include "rig_rows.hpp"
+#include "supple/rig_fit.hpp"
+
+namespace supple {
+
+/// Where the scan lands on the template, and the rows that follow.
+struct Pairs {
+  std::vector<Row> rows;       ///< point to plane, from the scan and from the template
+  Eigen::VectorXi triangle;    ///< (c) of the thinned scan; −1 left out
+  Points barycentric;          ///< (c, 3)
+  Eigen::VectorXd distance;    ///< (c) m
+  std::vector<int> row_of;     ///< (c) row of each point, −1
+  std::vector<int> vertex_row; ///< (n) row of each vertex, −1
+  double area = 0.0;           ///< m² of scan that found a partner
+};
+
+/// Finds pairs; keeps the trees, and where points landed last.
+class Matcher {
+ public:
+  explicit Matcher(const Rig& rig);
+  void set_scan(const ScanCloud& scan);
+
+  /// Rows' weights are areas/(patch² noise²) × the data's weight, so that a patch counts as one
+  /// observation, however many points it holds.
+  void match(const SkinState& state, const RigStage& stage, const RigWeights& weights,
+             const RigPriors& priors, Pairs& pairs);
+
+ private:
+  void from_scan(const SkinState& state, const RigStage& stage, double weight, Pairs& pairs);
+  void from_template(const SkinState& state, const RigStage& stage, double weight, Pairs& pairs);
+  void turn_normals(const Points& points);
+
+  const Rig& rig_;
+  const ScanCloud* scan_ = nullptr;
+  std::optional<SurfaceTree> skin_;
+  PointTree tree_;
+  std::vector<int> vertex_order_; ///< neighbours near each other
+  Points normals_;                ///< (n, 3) of the posed template, unit
+  Eigen::VectorXd areas_;         ///< (n) m², a third of the triangles around
+  Eigen::VectorXi hint_;
+};
+
+} // namespace supple

@@ -1,0 +1,216 @@
+#include "rig_scan.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "point_tree.hpp"
+#include "supple/error.hpp"
+
+namespace supple {
+namespace {
+
+using Vec3 = Eigen::Vector3d;
+using Index = Eigen::Index;
+
+/// The voxels that points lie in, numbered as they are met.
+class Voxels {
+ public:
+  Voxels(const Points& points, double size) : of_(static_cast<std::size_t>(points.rows())) {
+    const Vec3 low = points.colwise().minCoeff().transpose();
+    std::size_t slots = 1024;
+    while (slots < 2 * of_.size())
+      slots *= 2;
+    std::vector<std::uint64_t> keys(slots, kFree);
+    std::vector<int> numbers(slots);
+    for (std::size_t i = 0; i < of_.size(); ++i) {
+      const Vec3 cell = (points.row(static_cast<Index>(i)).transpose() - low) / size;
+      const std::uint64_t key = static_cast<std::uint64_t>(cell[0]) |
+                                static_cast<std::uint64_t>(cell[1]) << 21 |
+                                static_cast<std::uint64_t>(cell[2]) << 42;
+      std::size_t slot = (key * 0x9E3779B97F4A7C15ull >> 20) & (slots - 1);
+      while (keys[slot] != key && keys[slot] != kFree)
+        slot = (slot + 1) & (slots - 1);
+      if (keys[slot] == kFree) {
+        keys[slot] = key;
+        numbers[slot] = count_++;
+      }
+      of_[i] = numbers[slot];
+    }
+  }
+  int of(Index point) const { return of_[static_cast<std::size_t>(point)]; }
+  int count() const { return count_; }
+
+ private:
+  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
+  std::vector<int> of_;
+  int count_ = 0;
+};
+
+/// Normals (m, 3) weighted by area, not of unit length, from the triangles.
+Points triangle_normals(const Points& points, const Triangles& triangles) {
+  Points normals = Points::Zero(points.rows(), 3);
+  for (Index t = 0; t < triangles.rows(); ++t) {
+    const Vec3 a = points.row(triangles(t, 0)).transpose();
+    const Vec3 b = points.row(triangles(t, 1)).transpose();
+    const Vec3 c = points.row(triangles(t, 2)).transpose();
+    const Vec3 area = (b - a).cross(c - a);
+    for (int k = 0; k < 3; ++k)
+      normals.row(triangles(t, k)) += area.transpose();
+  }
+  return normals;
+}
+
+/// Points at an edge of one triangle alone: the edges opposite to them do not close a ring.
+std::vector<char> triangle_borders(Index points, const Triangles& triangles) {
+  const auto label = [](std::int32_t v) {
+    return (static_cast<std::uint64_t>(v) + 1) * 0x9E3779B97F4A7C15ull;
+  };
+  std::vector<std::uint64_t> sum(static_cast<std::size_t>(points), 0);
+  for (Index t = 0; t < triangles.rows(); ++t) {
+    const std::uint64_t a = label(triangles(t, 0)), b = label(triangles(t, 1)),
+                        c = label(triangles(t, 2));
+    sum[static_cast<std::size_t>(triangles(t, 0))] += b - c;
+    sum[static_cast<std::size_t>(triangles(t, 1))] += c - a;
+    sum[static_cast<std::size_t>(triangles(t, 2))] += a - b;
+  }
+  std::vector<char> border(sum.size());
+  for (std::size_t i = 0; i < sum.size(); ++i)
+    border[i] = sum[i] != 0;
+  return border;
+}
+
+/// One point a voxel: means of points and normals; at a border if more than a quarter of its
+/// points are.
+ScanCloud merged(const Points& points, const Points& normals, const std::vector<char>& border,
+                 const Voxels& voxels) {
+  const int count = voxels.count();
+  ScanCloud cloud;
+  cloud.points = Points::Zero(count, 3);
+  cloud.normals = Points::Zero(count, 3);
+  std::vector<int> held(static_cast<std::size_t>(count), 0), edge(held);
+  for (Index i = 0; i < points.rows(); ++i) {
+    const int v = voxels.of(i);
+    cloud.points.row(v) += points.row(i);
+    if (normals.rows() > 0) cloud.normals.row(v) += normals.row(i);
+    ++held[static_cast<std::size_t>(v)];
+    if (!border.empty()) edge[static_cast<std::size_t>(v)] += border[static_cast<std::size_t>(i)];
+  }
+  cloud.border.resize(static_cast<std::size_t>(count));
+  for (int v = 0; v < count; ++v) {
+    const std::size_t s = static_cast<std::size_t>(v);
+    cloud.points.row(v) /= held[s];
+    cloud.border[s] = 8 * edge[s] > held[s];
+  }
+  return cloud;
+}
+
+/// Normals along the least spread of the points around each, and borders where these lie to one
+/// side: the mean of a half disc is 0.42 of its radius away.
+void look_around(ScanCloud& cloud, const PointTree& tree, double radius, bool find_normals) {
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < cloud.points.rows(); ++i) {
+    const Vec3 centre = cloud.points.row(i).transpose();
+    Vec3 sum = Vec3::Zero();
+    Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+    int count = 0;
+    tree.within(centre, radius * radius, [&](int j, double) {
+      const Vec3 offset = cloud.points.row(j).transpose() - centre;
+      sum += offset;
+      moment += offset * offset.transpose();
+      ++count;
+    });
+    const Vec3 mean = sum / count;
+    if (find_normals && count >= 4) {
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread;
+      spread.computeDirect(moment / count - mean * mean.transpose());
+      cloud.normals.row(i) = spread.eigenvectors().col(0).transpose();
+    }
+    cloud.border[static_cast<std::size_t>(i)] = count < 4 || mean.norm() > 0.28 * radius;
+  }
+}
+
+void share_areas(ScanCloud& cloud, const std::vector<int>& voxel_of, int voxels, double size) {
+  std::vector<int> held(static_cast<std::size_t>(voxels), 0);
+  for (const int v : voxel_of)
+    ++held[static_cast<std::size_t>(v)];
+  cloud.area.resize(cloud.points.rows());
+  for (Index i = 0; i < cloud.points.rows(); ++i) {
+    const double cut = cloud.normals.row(i).cwiseAbs().sum();
+    cloud.area[i] = size * size / (cut > 0.0 ? cut : 1.5) /
+                    held[static_cast<std::size_t>(voxel_of[static_cast<std::size_t>(i)])];
+  }
+}
+
+void unit_normals(Points& normals) {
+  for (Index i = 0; i < normals.rows(); ++i) {
+    const double length = normals.row(i).norm();
+    if (length > 0.0) normals.row(i) /= length;
+  }
+}
+
+/// In the order of the tree.
+ScanCloud ordered(const ScanCloud& cloud, const std::vector<int>& order) {
+  ScanCloud result = cloud;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const Index to = static_cast<Index>(k);
+    result.points.row(to) = cloud.points.row(order[k]);
+    result.normals.row(to) = cloud.normals.row(order[k]);
+    result.area[to] = cloud.area[order[k]];
+    result.border[k] = cloud.border[static_cast<std::size_t>(order[k])];
+  }
+  return result;
+}
+
+void check(const Points& points, const Triangles& triangles, const Points& normals, double size) {
+  if (points.rows() == 0)
+    throw ShapeError("points must have a row at least, got none; give a scan");
+  if (normals.rows() > 0)
+    require_size("normals", normals.rows(), points.rows(), "give one a point, or none at all");
+  if (triangles.size() > 0 && (triangles.minCoeff() < 0 || triangles.maxCoeff() >= points.rows()))
+    throw ShapeError("triangles must name points from 0 to " + std::to_string(points.rows() - 1) +
+                     "; renumber the triangles");
+  if (!points.allFinite() || !normals.allFinite())
+    throw NumericalError("a scan must be finite, got NaN or infinity; repair it");
+  const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
+  if (!(size > 0.0) || extent / size > 2e6)
+    throw NumericalError(
+        "voxel must be above 0 m and above a millionth of the scan's extent, got " +
+        std::to_string(size) + "; take 0.01");
+}
+
+} // namespace
+
+ScanCloud prepared(const Points& points, const Triangles& triangles, const Points& normals,
+                   const ScanSettings& settings) {
+  check(points, triangles, normals, settings.voxel);
+  const bool meshed = triangles.rows() > 0, given = normals.rows() > 0;
+  const Voxels voxels(points, settings.voxel);
+  const Points found = given ? normals : meshed ? triangle_normals(points, triangles) : Points();
+  const std::vector<char> border =
+      meshed ? triangle_borders(points.rows(), triangles) : std::vector<char>();
+  ScanCloud cloud;
+  std::vector<int> voxel_of;
+  if (settings.thin) {
+    cloud = merged(points, found, border, voxels);
+    voxel_of.resize(static_cast<std::size_t>(voxels.count()));
+    std::iota(voxel_of.begin(), voxel_of.end(), 0);
+  } else {
+    cloud.points = points;
+    cloud.normals = given || meshed ? found : Points::Zero(points.rows(), 3);
+    cloud.border = meshed ? border : std::vector<char>(static_cast<std::size_t>(points.rows()), 0);
+    for (Index i = 0; i < points.rows(); ++i)
+      voxel_of.push_back(voxels.of(i));
+  }
+  cloud.oriented = given || meshed;
+  unit_normals(cloud.normals);
+  const PointTree tree(cloud.points);
+  if (!meshed) look_around(cloud, tree, 2.2 * settings.voxel, !given);
+  share_areas(cloud, voxel_of, voxels.count(), settings.voxel);
+  return ordered(cloud, tree.order());
+}
+
+} // namespace supple

@@ -1,0 +1,285 @@
+"""The fit of a template to a scan by the C++ core: its settings, its loop, what it returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from supple.core import core
+from supple.errors import ConvergenceError, InputError
+from supple.registration.posture import Posture
+from supple.registration.template import Template
+from supple.registration.weights import Weights
+from supple.surface import Surface
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Moves = Literal["rigid", "bones", "scales", "all"]
+_MOVES = ("rigid", "bones", "scales", "all")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of the way from coarse to fine."""
+
+    moves: Moves = "all"  #: one body; bones; their scales too; the blend too
+    iterations: int = 10  #: at most
+    tolerance: float = 5e-5  #: m: it ends when no vertex moves further
+    reach: float = 30e-3  #: m: pairs further apart are none
+    loss: float = 8e-3  #: m: the residual that counts a quarter (Geman–McClure)
+    angle: float = 60.0  #: degrees between normals of a pair, at most
+    template_share: float = 0.3  #: of the data that looks from the template to the scan
+    point_share: float = 0.0  #: of point-to-point in that
+    every_vertex: int = 1  #: uses every so many vertices
+    every_point: int = 1  #: uses every so many points of the thinned scan
+
+
+#: From a pose that is a few cm and 20° off.
+COLD = (
+    Stage("rigid", 6, 2e-3, 0.12, 0.06, 75.0, 0.5, 0.05, 4, 8),
+    Stage("bones", 8, 2e-3, 0.10, 0.04, 75.0, 0.5, 0.03, 4, 6),
+    Stage("scales", 6, 1e-3, 0.08, 0.025, 70.0, 0.5, 0.02, 3, 4),
+    Stage("all", 8, 5e-4, 0.05, 0.015, 60.0, 0.4, 0.01, 2, 2),
+    Stage("all", 8, 1e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 1, 1),
+)
+#: The next frame of a moving scan.
+WARM = (
+    Stage("all", 2, 1e-3, 0.05, 0.02, 60.0, 0.5, 0.01, 3, 4),
+    Stage("all", 2, 2e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 2, 2),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Priors:
+    """Standard deviations that make the energy's terms dimensionless; None: its default.
+
+    Attributes:
+        noise: m, of the mean residual of a patch: scan noise that thinning leaves, and the shape
+            that the template lacks.
+        patch: m; data within patch × patch count as one observation however dense they are, as
+            neighbours' residuals share their cause.
+        scale: (K,) of s_k − s_parent, and of s − 1 for the root; 0.1.
+        joint: (K,) m of T_k(j_k) − T_parent(j_k); 1 mm: a joint is tight, and cheap to hold.
+        rotation: (K,) rad, of a bone against its parent; 0.5: only bones that see no data stay.
+        blend_mean, blend_covariance: (A,), (A, A) of a statistical prior; 0 and I: shapes are made
+            so that a coefficient of 1 is one standard deviation.
+        stiff_joints: joints hold exactly, by Lagrange multipliers.
+        convex: Σ α = 1 and α ≥ 0, as in the thesis, whose shapes are whole bodies. Ours are
+            offsets from the template, of both signs, and 0 of all is a body: off.
+        bounded: the blend stays within the template's bounds.
+        scale_bounds: of all scales.
+    """
+
+    noise: float = 2e-3
+    patch: float = 15e-3
+    scale: npt.ArrayLike | None = None
+    joint: npt.ArrayLike | None = None
+    rotation: npt.ArrayLike | None = None
+    blend_mean: npt.ArrayLike | None = None
+    blend_covariance: npt.ArrayLike | None = None
+    stiff_joints: bool = False
+    convex: bool = False
+    bounded: bool = True
+    scale_bounds: tuple[float, float] = (0.5, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class RigFit:
+    """What a fit found.
+
+    Attributes:
+        posture: at the end.
+        points: (n, 3) m, the template's vertices there.
+        converged: the last stage ended because nothing moved further than its tolerance.
+        last_step: m, largest movement of a vertex in the last iteration.
+        iterations: of each stage.
+        history: energy at the start of each iteration, for the pairs of that iteration.
+        seconds: of each stage.
+        energy: of each term at the end.
+        data_matrix, prior_matrix: (9K+A, 9K+A); their sum is the inverse covariance if residuals
+            of patches are independent with standard deviation ``Priors.noise``.
+        patch_sd: m, robust standard deviation of the mean residual of a patch, as found.
+        residual_sd: m, that of all residuals.
+        observations: patches of the template that the scan shows.
+        scan_points, scan_normals: (c, 3) of the thinned scan.
+        triangle: (c,) of the template where each of them lands; -1 where it has no partner.
+        barycentric: (c, 3); distance (c,) m, NaN without partner.
+        used: (c,) robust weight 0..1 of each; vertex_used (n,) of each vertex' pair.
+    """
+
+    posture: Posture
+    points: Floats
+    converged: bool
+    last_step: float
+    iterations: list[int]
+    history: list[float]
+    seconds: list[float]
+    energy: dict[str, float]
+    data_matrix: Floats
+    prior_matrix: Floats
+    patch_sd: float
+    residual_sd: float
+    observations: float
+    scan_points: Floats
+    scan_normals: Floats
+    triangle: Ints
+    barycentric: Floats
+    distance: Floats
+    used: Floats
+    vertex_used: Floats
+    noise: float = field(default=2e-3)
+
+    def covariance(self, inflation: float = 1.0) -> Floats:
+        """Of the unknowns (9K+A, 9K+A), in the order of `Posture.stepped`.
+
+        (JᵀWJ/(f·inflation) + priors)⁻¹, where f = (patch_sd/noise)² corrects the variance that was
+        assumed for a patch to the one that was found, if it is larger.
+        """
+        found = max(self.patch_sd / self.noise, 1.0) ** 2 * inflation
+        return np.asarray(np.linalg.inv(self.data_matrix / found + self.prior_matrix))
+
+
+class Rig:
+    """A template in the core, ready to be posed and fitted many times.
+
+    Args:
+        template: its bones, weights and blendshapes.
+        dual_quaternion: skinning by blended dual quaternions (Kavan et al. 2007) instead of linear
+            blending; each vertex is scaled first, Σ w (S (x − j) + j), then moved rigidly.
+    """
+
+    def __init__(self, template: Template, dual_quaternion: bool = False) -> None:
+        self.template = template
+        shapes = np.ascontiguousarray(template.blendshapes).reshape(len(template.blendshapes), -1)
+        self._rig = core().Rig(
+            template.points, template.triangles.astype(np.int32), template.joints,
+            template.parents.astype(np.int32), template.weights, shapes, dual_quaternion,
+        )  # fmt: skip
+        self._fit = core().RigFit(self._rig)
+
+    def vertices(self, posture: Posture) -> Floats:
+        """(n, 3) m."""
+        return np.asarray(self._rig.vertices(*_arrays(posture)))
+
+    def jacobian(self, posture: Posture) -> Floats:
+        """(3n, 9K+A) of the vertices by the steps of `Posture.stepped`."""
+        return np.asarray(self._rig.jacobian(*_arrays(posture)))
+
+    def vertex_sd(self, posture: Posture, covariance: Floats) -> Floats:
+        """(n,) m: √(trace of a vertex' covariance / 3), for that of the unknowns."""
+        return np.asarray(self._rig.vertex_sd(*_arrays(posture), covariance))
+
+    def set_scan(
+        self,
+        scan: Surface,
+        normals: npt.ArrayLike | None = None,
+        voxel: float = 10e-3,
+        thin: bool = True,
+    ) -> None:
+        """The scan of the fits to come.
+
+        Args:
+            scan: m; a cloud without triangles does too.
+            normals: (m, 3) outward, of its points. Without them and without triangles they come
+                from the points around, and their sign stays open.
+            voxel: m; the points of a voxel become their mean.
+            thin: False: every point is used as it is.
+        """
+        given = np.empty((0, 3)) if normals is None else np.asarray(normals, dtype=np.float64)
+        self._fit.set_scan(scan.points, scan.triangles.astype(np.int32), given, voxel, thin)
+
+    def fit(
+        self,
+        start: Posture,
+        stages: Sequence[Stage] = COLD,
+        weights: Weights | None = None,
+        priors: Priors | None = None,
+        landmarks: Mapping[str, npt.ArrayLike] | None = None,
+        landmark_sd: float | Mapping[str, float] = 5e-3,
+    ) -> RigFit:
+        """Fit to the scan from ``start``; other threads may run meanwhile.
+
+        Args:
+            landmarks: name → (3,) m on the scan.
+            landmark_sd: m, of all or of each.
+
+        Raises:
+            InputError: no scan, a landmark that the template does not name.
+            ConvergenceError: no pairs within reach: the start is too far away.
+        """
+        chosen, named = priors or Priors(), landmarks or {}
+        try:
+            found = self._fit.run(
+                *_arrays(start), _weights(weights or Weights()),
+                _priors(chosen, self.template), [_stage(stage) for stage in stages],
+                *self._landmarks(named, landmark_sd),
+            )  # fmt: skip
+        except core().Error as error:
+            kind = ConvergenceError if "pairs" in str(error) else InputError
+            raise kind(str(error)) from None
+        return self._result(found, chosen)
+
+    def _landmarks(
+        self, named: Mapping[str, npt.ArrayLike], sd: float | Mapping[str, float]
+    ) -> tuple[Any, ...]:
+        known = self.template.landmarks
+        for name in named:
+            if name not in known:
+                raise InputError(f"landmark {name!r} must be one of {', '.join(known)}.")
+        triangle = [known[name].triangle[0] for name in named]
+        barycentric = [known[name].barycentric[0] for name in named]
+        sds = [sd[name] if isinstance(sd, Mapping) else sd for name in named]
+        return (
+            np.array(triangle, dtype=np.int32),
+            np.array(barycentric, dtype=float).reshape(-1, 3),
+            np.array([np.asarray(at, dtype=float) for at in named.values()]).reshape(-1, 3),
+            np.array(sds, dtype=float),
+        )
+
+    def _result(self, found: Any, priors: Priors) -> RigFit:
+        posture, scan = Posture(*found.posture), self._fit.scan
+        terms = ("data", "scale", "blendshape", "joint", "landmark", "rotation")
+        return RigFit(
+            posture, self.vertices(posture), found.converged, found.last_step, found.iterations,
+            found.history, found.stage_seconds, {name: getattr(found.terms, name) for name in terms},
+            found.data_matrix, found.prior_matrix, found.patch_sd, found.residual_sd,
+            found.observations, scan.points, scan.normals, found.triangle.astype(np.int64),
+            found.barycentric, found.distance, found.used, found.vertex_used, priors.noise,
+        )  # fmt: skip
+
+
+def _arrays(posture: Posture) -> tuple[Floats, Floats, Floats, Floats]:
+    return posture.rotations, posture.translations, posture.scales, posture.blend
+
+
+def _stage(stage: Stage) -> Any:
+    made = core().RigStage()
+    for name, value in vars(stage).items():
+        setattr(made, name, _MOVES.index(value) if name == "moves" else value)
+    return made
+
+
+def _weights(weights: Weights) -> Any:
+    made = core().RigWeights()
+    for name, value in vars(weights).items():
+        setattr(made, name, value)
+    return made
+
+
+def _priors(priors: Priors, template: Template) -> Any:
+    made = core().RigPriors()
+    for name in ("noise", "patch", "stiff_joints", "convex"):
+        setattr(made, name, getattr(priors, name))
+    for name in ("scale", "joint", "rotation", "blend_mean"):
+        if getattr(priors, name) is not None:
+            setattr(made, name, np.asarray(getattr(priors, name), dtype=np.float64))
+    if priors.blend_covariance is not None:
+        made.blend_precision = np.linalg.inv(np.asarray(priors.blend_covariance, dtype=np.float64))
+    if priors.bounded:
+        made.blend_lower, made.blend_upper = template.blendshape_bounds.T
+    made.scale_lower, made.scale_upper = priors.scale_bounds
+    return made
