@@ -35,15 +35,15 @@ _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
 _OUTLINE = 0.2
 
 
-def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0175) -> Template:
+def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0185) -> Template:
     """The torso of an average young woman, 1.59 m tall.
 
     Args:
         folder: laid out as MakeHuman's data: 3dobjs/base.obj, targets/, rigs/.
         mpfb: laid out as MPFB 2's data, for its table of mirrored vertices; without it they are
             found by place.
-        spacing: longest edge on the breasts, m, as far as one division goes; twice that elsewhere.
-            0.0175 gives about 2,200 vertices.
+        spacing: longest edge on the breasts, m, as they are or half a cup range fuller, as far as
+            one division goes; twice that elsewhere. 0.0185 gives about 2,200 vertices.
 
     Raises:
         InputError: a file is missing or not MakeHuman's.
@@ -51,10 +51,11 @@ def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0175) -> Te
     """
     base = read_base(Path(folder), None if mpfb is None else Path(mpfb))
     woman = base.points + sum(base.target(f"macrodetails/{p}-female-young") for p in _PEOPLES) / 3
-    full = np.linalg.norm(base.target(_FULL), axis=1)
+    more = base.target(_FULL)
     half = _cut(base, woman)
-    longest = np.where(half.means @ full > 0.05 * full.max(), spacing, 2 * spacing)
-    half = refined(half, woman, base.mirror, longest)
+    full = half.means @ np.linalg.norm(more, axis=1)
+    longest = np.where(full > 0.1 * full.max(), spacing, 2 * spacing)
+    half = refined(half, woman, woman + more / 2, base.mirror, longest)
     return _template(base, woman, half)
 
 
