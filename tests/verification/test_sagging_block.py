@@ -110,8 +110,9 @@ def test_ctrl_c_leaves_a_table_that_the_command_resumes(tmp_path):
     arguments = ["study", "sagging-block", "--samples", "12", "--jobs", "1", "--out"]
     words = [sys.executable, "-m", "supple", *arguments, str(table.parent)]
     process = subprocess.Popen(
-        words, stderr=subprocess.PIPE, text=True, start_new_session=True, env=dict(os.environ)
-    )
+        words, stderr=subprocess.PIPE, text=True, start_new_session=True, env=dict(os.environ),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's "&" ignores it
+    )  # fmt: skip
     while process.poll() is None and (not table.exists() or table.read_bytes().count(b"\n") < 3):
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGINT)
