@@ -23,13 +23,14 @@ Floats = npt.NDArray[np.float64]
 
 SOURCE = (
     "hm08 body, targets, rig and weights of MakeHuman, (c) 2020 Data Collection AB, J. Palmius, "
-    "J. Hauquier; CC0"
+    "J. Hauquier, 2021 Elvaerwyn; CC0"
 )
 _PEOPLES = ("african", "asian", "caucasian")
 _FULL = "breast/female-young-averagemuscle-averageweight-maxcup-averagefirmness"
 _NIPPLE = "breast/nipple-point-incr"
 _HIPS = 0.05  #: height of the lower cut, m
-_NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])  #: a point of the cut, and its normal
+#: A point of the neck's cut, m, and its normal.
+_NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])
 _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
 #: Where the breast begins: geometric mean of its bone's weight and of its move by a fuller cup.
 _OUTLINE = 0.2
