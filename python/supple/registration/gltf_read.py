@@ -67,7 +67,7 @@ def _chunks(data: bytes, file: Path) -> tuple[bytes, bytes]:
 
 def _embedded(document: Any, file: Path) -> bytes:
     """The numbers of a .gltf file, which must stand in the file itself."""
-    uri = document.buffers[0].uri if document.buffers else None
+    uri = getattr(document.buffers[0], "uri", None) if document.buffers else None
     head, comma, body = (uri or "").partition(",")
     if not (head.startswith("data:") and head.endswith(";base64") and comma):
         raise InputError(f"{file} must hold its numbers itself, as a base64 URI, got "
