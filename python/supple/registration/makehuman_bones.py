@@ -27,6 +27,9 @@ _PARTS = {
 }  # fmt: skip
 #: Length over which weights are evened out, m.
 _EVEN = 0.01
+#: Largest weight of bones that the rig lets move nothing alone.
+_TOPS = {("shoulder_left", "shoulder_right"): 0.7, ("neck",): 1.0,
+         ("breast_left", "breast_right"): 1.0}  # fmt: skip
 #: Bone of the torso → the bone of the rig at whose head it turns.
 _HEADS = {"abdomen": "spine04", "chest": "spine02", "neck": "neck01",
           "shoulder_left": "clavicle.L", "arm_left": "upperarm01.L"}  # fmt: skip
@@ -36,17 +39,17 @@ def weights(base: BaseMesh, means: Any, skin: Skin) -> Floats:
     """Weights (n, 9) at the vertices of the torso, in the order of BONES; rows sum to 1.
 
     The rig's own are evened out over `_EVEN`: in the armpit they jump within a few mm. It shares
-    neck and breasts with the chest even at their far ends; here these come to 1 where they are
-    largest, so that each of these bones moves something alone.
+    shoulders, neck and breasts with the chest even where they are strongest; here they come to
+    `_TOPS` there, so that a scan tells what each of these bones does.
     """
     rig = base.weights()
     left = {name: means @ sum(rig[part] for part in parts) for name, parts in _PARTS.items()}
     whole = np.stack([_side(left, name, skin.mirror) for name, _ in BONES], axis=1)
     whole = np.clip(_evened(whole, skin), 0.0, None)
     names = [name for name, _ in BONES]
-    _raise(whole, [names.index("neck")])
-    _raise(whole, [names.index("breast_left"), names.index("breast_right")])
-    whole[whole < 1e-4] = 0.0
+    for bones, top in _TOPS.items():
+        _raise(whole, [names.index(bone) for bone in bones], top)
+    whole[whole < 1e-3] = 0.0  # too small to see
     return np.asarray(whole / whole.sum(axis=1, keepdims=True))
 
 
@@ -75,10 +78,10 @@ def _side(left: dict[str, Floats], name: str, mirror: Ints) -> Floats:
     return own if name.endswith("_left") else (own + own[mirror]) / 2
 
 
-def _raise(whole: Floats, columns: list[int]) -> None:
-    """Scale columns so that the largest is 1, at the cost of all others in equal parts."""
+def _raise(whole: Floats, columns: list[int], top: float) -> None:
+    """Scale columns so that the largest is ``top``, at the cost of all others in equal parts."""
     whole /= np.maximum(whole.sum(axis=1, keepdims=True), 1e-12)
-    raised = whole[:, columns] / whole[:, columns].max()
+    raised = top * whole[:, columns] / whole[:, columns].max()
     others = 1 - whole[:, columns].sum(axis=1)
     whole *= (np.maximum(1 - raised.sum(axis=1), 0) / np.maximum(others, 1e-12))[:, None]
     whole[:, columns] = raised
