@@ -13,6 +13,8 @@ from supple.registration.template import OnSurface
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+#: From the sternal notch straight to the tip of the xiphoid, m: 0.12 of her height.
+_STERNUM = 0.19
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,8 +132,9 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
 def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> dict[str, OnSurface]:
     """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight.
 
-    Nipple: the middle of what moves with the nipple's tip. Medial, lateral, inferior: the ends of
-    the breast's outline. Xiphoid: on the profile at the height of the lower folds.
+    Nipple: the middle of what moves with the nipple's tip. Medial and lateral: the breast's
+    outline at the height of the nipple; inferior: its lowest point. Xiphoid: on the profile,
+    `_STERNUM` below the notch, as the base mesh shows no bone there.
     """
     around = skin.at(outline)
     tip = np.where(skin.points[:, 0] > 0, nipple, 0.0)
@@ -139,17 +142,28 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
     marks = {
         "nipple": skin.nearest(tip @ skin.points / tip.sum()),
         "axilla": skin.nearest(_axilla(skin, arm)),
-        "breast_medial": skin.nearest(around[around[:, 0].argmin()]),
-        "breast_lateral": skin.nearest(around[around[:, 0].argmax()]),
         "breast_inferior": skin.nearest(around[around[:, 2].argmin()]),
     }
-    fold = float(around[:, 2].min())
     level = float(skin.at(marks["nipple"])[0, 2])
-    result = {"sternal_notch": skin.nearest(_notch(skin, level)),
-              "xiphoid": skin.nearest(skin.profile(fold, fold, 1))}  # fmt: skip
+    ends = _level(around, level)
+    marks["breast_medial"] = skin.nearest(ends[ends[:, 0].argmin()])
+    marks["breast_lateral"] = skin.nearest(ends[ends[:, 0].argmax()])
+    notch = _notch(skin, level)
+    line = skin.profile(notch[2] - _STERNUM, notch[2], 2000)
+    far = np.linalg.norm(line - notch, axis=1)
+    result = {"sternal_notch": skin.nearest(notch),
+              "xiphoid": skin.nearest(line[np.argmin(np.abs(far - _STERNUM))])}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
+
+
+def _level(line: Floats, height: float) -> Floats:
+    """Where a closed line (k, 3) m crosses a height, (m, 3) m."""
+    a, b = line, np.roll(line, -1, axis=0)
+    crossing = (a[:, 2] < height) != (b[:, 2] < height)
+    a, b = a[crossing], b[crossing]
+    return np.asarray(a + (b - a) * ((height - a[:, 2]) / (b - a)[:, 2])[:, None])
 
 
 def _notch(skin: Skin, below: float) -> Floats:
