@@ -13,6 +13,8 @@ from supple.registration.template import OnSurface
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+#: From the sternal notch straight to the tip of the xiphoid, m: 0.12 of her height.
+_STERNUM = 0.19
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,7 +59,7 @@ class Skin:
         on = self.points[np.abs(self.points[:, 0]) < 1e-9]
         spine = np.median(on[:, 1])
         line = on[(on[:, 1] < spine) == front]
-        return line[np.argsort(line[:, 2])]
+        return np.asarray(line[np.argsort(line[:, 2])])
 
     def profile(self, low: float, high: float, count: int) -> Floats:
         """Points (count, 3) m on the front's profile between two heights, evenly in height."""
@@ -84,7 +86,7 @@ class Skin:
                 ends.setdefault(one, []).append(other)
         loops = _loops(ends)
         if not loops:
-            raise MeshError("the targets must move a breast with a closed outline; take them unchanged.")
+            raise MeshError("the targets must move a breast with a closed outline; take hm08's.")
         edges = np.array(max(loops, key=len))
         share = (level - field[edges[:, 0]]) / (field[edges[:, 1]] - field[edges[:, 0]])
         line = self.points[edges[:, 0]] * (1 - share[:, None])
@@ -130,8 +132,9 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
 def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> dict[str, OnSurface]:
     """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight.
 
-    Nipple: the middle of what moves with the nipple's tip. Medial, lateral, inferior: the ends of
-    the breast's outline. Xiphoid: on the profile at the height of the lower folds.
+    Nipple: the middle of what moves with the nipple's tip. Medial and lateral: the breast's
+    outline at the height of the nipple; inferior: its lowest point. Xiphoid: on the profile,
+    `_STERNUM` below the notch, as the base mesh shows no bone there.
     """
     around = skin.at(outline)
     tip = np.where(skin.points[:, 0] > 0, nipple, 0.0)
@@ -139,34 +142,51 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
     marks = {
         "nipple": skin.nearest(tip @ skin.points / tip.sum()),
         "axilla": skin.nearest(_axilla(skin, arm)),
-        "breast_medial": skin.nearest(around[around[:, 0].argmin()]),
-        "breast_lateral": skin.nearest(around[around[:, 0].argmax()]),
         "breast_inferior": skin.nearest(around[around[:, 2].argmin()]),
     }
-    result = {"sternal_notch": skin.nearest(_notch(skin)),
-              "xiphoid": skin.nearest(skin.profile(*[around[:, 2].min()] * 2, 1))}  # fmt: skip
+    level = float(skin.at(marks["nipple"])[0, 2])
+    ends = _level(around, level)
+    marks["breast_medial"] = skin.nearest(ends[ends[:, 0].argmin()])
+    marks["breast_lateral"] = skin.nearest(ends[ends[:, 0].argmax()])
+    notch = _notch(skin, level)
+    line = skin.profile(notch[2] - _STERNUM, notch[2], 2000)
+    far = np.linalg.norm(line - notch, axis=1)
+    result = {"sternal_notch": skin.nearest(notch),
+              "xiphoid": skin.nearest(line[np.argmin(np.abs(far - _STERNUM))])}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
 
 
-def _notch(skin: Skin, window: float = 0.02) -> Floats:
-    """Where the profile turns most from the chest to the neck within ``window`` m of height."""
+def _level(line: Floats, height: float) -> Floats:
+    """Where a closed line (k, 3) m crosses a height, (m, 3) m."""
+    a, b = line, np.roll(line, -1, axis=0)
+    crossing = (a[:, 2] < height) != (b[:, 2] < height)
+    a, b = a[crossing], b[crossing]
+    return np.asarray(a + (b - a) * ((height - a[:, 2]) / (b - a)[:, 2])[:, None])
+
+
+def _notch(skin: Skin, below: float) -> Floats:
+    """Where the profile lies deepest behind its chord from the neck's cut to the height ``below``.
+
+    A spline through the profile's vertices, so that it does not depend on how fine they are.
+    """
+    from scipy.interpolate import CubicSpline
+
     line = skin.middle(front=True)
-    z = np.arange(np.quantile(line[:, 2], 0.5), line[-1, 2] - window, 1e-4)
-    angle = np.arctan(np.gradient(np.interp(z, line[:, 2], line[:, 1]), z))
-    steps = round(window / 1e-4)
-    turn = angle[steps:] - angle[:-steps]
-    height = z[int(np.argmin(turn)) + steps // 2]
-    return skin.profile(height, height, 1)[0]
+    depth = CubicSpline(line[:, 2], line[:, 1])
+    z = np.arange(below, line[-1, 2], 1e-4)
+    chord = np.interp(z, z[[0, -1]], depth(z[[0, -1]]))
+    height = float(z[int(np.argmax(depth(z) - chord))])
+    return np.asarray(skin.profile(height, height, 1)[0])
 
 
 def _axilla(skin: Skin, arm: Floats) -> Floats:
-    """The anterior axillary fold: the lowest place of the front where arm and chest share evenly."""
+    """The anterior axillary fold: the lowest place in front where arm and chest share the skin."""
     line = skin.outline(arm, 0.45, 400)
     normal = skin.normals()[skin.nearest(line).triangle]
     front = line[normal[:, 1] < -0.5]
-    return front[front[:, 2].argmin()]
+    return np.asarray(front[front[:, 2].argmin()])
 
 
 def curves(skin: Skin, marks: dict[str, OnSurface], outline: OnSurface) -> dict[str, OnSurface]:

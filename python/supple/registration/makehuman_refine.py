@@ -85,14 +85,13 @@ def _rim(triangles: Ints) -> Ints:
 def _faired(means: Any, triangles: Ints, at: Floats, free: Ints) -> Any:
     """``means`` with its rows ``free`` where (M^-1 L)ᵀ M (M^-1 L) x = 0, all other rows held."""
     from scipy import sparse
-    from scipy.sparse.linalg import splu
 
     stiffness, mass = laplacian(at, triangles)
     bending = (stiffness.T @ sparse.diags_array(1 / mass) @ stiffness).tocsr()
     held = np.setdiff1d(np.arange(len(at)), free)
     force = -(bending[free][:, held] @ means[held]).tocsc()
     columns = np.flatnonzero(np.diff(force.indptr))
-    solved = splu(bending[free][:, free].tocsc()).solve(force[:, columns].toarray())
+    solved = np.linalg.solve(bending[free][:, free].toarray(), force[:, columns].toarray())
     solved[np.abs(solved) < 1e-6] = 0
     solved /= solved.sum(axis=1, keepdims=True)
     rows, used = np.nonzero(solved)
@@ -121,4 +120,4 @@ def laplacian(at: Floats, triangles: Ints) -> tuple[Any, Floats]:
         stiffness = stiffness - half - half.T
     stiffness = stiffness - sparse.diags_array(np.asarray(stiffness.sum(axis=1)).ravel())
     mass = np.bincount(triangles.ravel(), np.repeat(double / 6, 3), minlength=n)
-    return stiffness.tocsr(), mass
+    return stiffness.tocsr(), np.asarray(mass, dtype=np.float64)

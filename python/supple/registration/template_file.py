@@ -1,4 +1,4 @@
-"""A template as a glTF 2.0 file, which carries skin, bones and blendshapes into Blender and back."""
+"""A template as a glTF 2.0 file, which carries skin, bones and blendshapes into Blender."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ def write_template(template: Template, path: str | Path) -> Path:
 
 
 def read_template(path: str | Path) -> Template:
-    """Read what `write_template` wrote; ``.gltf`` only with its numbers inside.
+    """Read what `write_template` wrote, or what Blender made of it with custom properties kept.
+
+    ``.gltf`` only with its numbers inside. Bones come in the order of BONES, joints from the bind
+    pose. Vertices and triangles must keep their order, which landmarks and mirror count in.
 
     Raises:
         InputError: no such file, no glTF 2.0, or one without a template's skin or drawing.
@@ -47,5 +50,5 @@ def read_template(path: str | Path) -> Template:
 
 def _checked(file: Path) -> Path:
     if file.suffix.lower() not in _FORMATS:
-        raise InputError(f"a template's path must end in {' or '.join(_FORMATS)}, got {file.name!r}.")
+        raise InputError(f"path must end in {' or '.join(_FORMATS)}, got {file.name!r}.")
     return file
