@@ -140,7 +140,7 @@ def breast(p: Floats) -> tuple[Floats, Floats]:
     mound = smooth_min(pole, slope, 0.05)
     areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
     nipple = np.linalg.norm(q - NIPPLE, axis=1) - 0.0055
-    softness = 0.016 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
+    softness = 0.021 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
     return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
 
 

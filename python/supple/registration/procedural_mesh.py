@@ -59,6 +59,8 @@ def _marched() -> tuple[Floats, Ints]:
     ]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = body.level(grid.reshape(-1, 3)).reshape(grid.shape[:3])
+    # a crossing next to a corner would make a sliver; the vertices move to the zero later
+    values = np.copysign(np.maximum(np.abs(values), 0.1 * _CELL), values)
     draw: Any = marching_cubes
     at, triangles, _, _ = draw(values, 0.0, allow_degenerate=False)
     return at.astype(np.float64) * _CELL + (0.0, *_LOW), triangles.astype(np.int64)
