@@ -16,7 +16,7 @@ from supple.surface import Surface
 Floats = npt.NDArray[np.float64]
 
 NOTCH, XIPHOID = 0.140, -0.030  #: heights of the ends of the sternum, m
-AXILLA = np.array([0.152, -0.012, 0.056])  #: near the left one, m
+AXILLA = (0.156, 0.054)  #: x and z of the left one, m: where arm and chest part in front
 _MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
 _MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
 
@@ -80,7 +80,9 @@ def _left_places() -> dict[str, Floats]:
     line = body.met(start, -body.BREAST_AXES[2])
     return {
         "nipple_left": body.nipple()[None],
-        "axilla_left": AXILLA[None],
+        "axilla_left": body.met(
+            np.array([[AXILLA[0], -0.2, AXILLA[1]]]), np.array([0.0, 1.0, 0.0])
+        ),
         "breast_medial_left": line[:1],
         "breast_inferior_left": line[12:13],
         "breast_lateral_left": line[24:25],

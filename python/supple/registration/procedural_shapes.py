@@ -21,10 +21,10 @@ _TIGHTER = {
     "breast_projection": (-2.5, 5.0),
     "breast_heavy": (-2.5, 5.0),
     "axilla_front": (-4.0, 2.5),
-    "axilla_side": (-4.0, 2.5),
+    "axilla_side": (-4.0, 2.0),
     "arm_length": (-2.5, 4.0),
-    "chest_0": (-4.0, 3.5),
-    "chest_110": (-4.0, 3.5),
+    "chest_0": (-4.0, 2.5),
+    "chest_110": (-4.0, 3.0),
 }
 
 
