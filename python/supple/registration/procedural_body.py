@@ -27,10 +27,10 @@ _TRUNK = np.array([
     (-0.15, 0.138, -0.115, 0.078, 2.35),
     (-0.08, 0.137, -0.109, 0.084, 2.4),
     (0.00, 0.144, -0.101, 0.098, 2.45),
-    (0.07, 0.141, -0.083, 0.105, 2.45),
-    (0.12, 0.124, -0.062, 0.105, 2.4),
-    (0.16, 0.096, -0.042, 0.098, 2.2),
-    (0.20, 0.060, -0.018, 0.088, 2.0),
+    (0.07, 0.141, -0.083, 0.103, 2.45),
+    (0.12, 0.124, -0.062, 0.101, 2.4),
+    (0.16, 0.096, -0.042, 0.092, 2.2),
+    (0.20, 0.060, -0.018, 0.084, 2.0),
     (0.26, 0.040, -0.010, 0.070, 2.0),
 ])  # fmt: skip
 
@@ -139,9 +139,15 @@ def breast(p: Floats) -> tuple[Floats, Floats]:
     slope = ellipsoid(q - (-0.002, 0.026, -0.030), (0.058, 0.080, 0.046))
     mound = smooth_min(pole, slope, 0.05)
     areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
-    nipple = np.linalg.norm(q - NIPPLE, axis=1) - 0.0055
-    softness = 0.016 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
+    nipple = np.linalg.norm(q - NIPPLE + (0.0, 0.0, 0.003), axis=1) - 0.0055
+    softness = 0.021 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
     return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
+
+
+def nipple() -> Floats:
+    """The tip (3,) m of the left one."""
+    before = NIPPLE * (1.0, 1.0, 0.0) + (0.0, 0.0, 0.1)
+    return np.asarray(met((BREAST + before @ BREAST_AXES)[None], -BREAST_AXES[2])[0])
 
 
 def cone(p: Floats, a: tuple[float, ...], b: tuple[float, ...], ra: float, rb: float) -> Floats:

@@ -49,26 +49,29 @@ def _swell(u: float, v: float, radii: Sequence[float], height: float) -> Field:
 
 BREAST_SHAPES: dict[str, Field] = {
     "breast_size_left": _in_breast(
-        lambda q, r: (0.12 * q[:, 0] * r**0.5, 0.12 * q[:, 1] * r**0.5, 0.010 * r)),
-    "breast_projection_left": _in_breast(lambda q, r: (0.0, 0.0, 0.010 * r)),
+        lambda q, r: (0.16 * q[:, 0] * r**0.5, 0.16 * q[:, 1] * r**0.5, 0.014 * r**0.8)),
+    "breast_projection_left": _in_breast(lambda q, r: (0.0, 0.0, 0.012 * smooth(r / 1.2))),
     "breast_width_left": _in_breast(lambda q, _: (0.10 * q[:, 0], 0.0, 0.0)),
     "breast_height_left": _in_breast(lambda q, _: (0.0, 0.10 * q[:, 1], 0.0)),
     "breast_up_left": _in_breast(lambda q, r: (0.0, 0.010, 0.0)),
     "breast_lateral_left": _in_breast(lambda q, r: (0.008, 0.0, 0.0)),
     "breast_ptosis_left": _in_breast(
-        lambda q, r: (0.0, -0.014 * r**1.5, -0.004 * r * (q[:, 1] > -1))),
+        lambda q, r: (0.0, -0.018 * r**1.5, -0.003 * r)),
+    "breast_heavy_left": _in_breast(
+        lambda q, r: (0.10 * q[:, 0] * r, -0.010 * r, 0.016 * r * smooth(0.5 - q[:, 1] / 0.10))
+    ),
     "breast_sag_left": _in_breast(
         lambda q, r: (0.0, -0.010 * r * smooth(-q[:, 1] / 0.06), 0.004 * r)),
-    "breast_turn_left": _in_breast(lambda q, r: (0.010 * r, 0.0, 0.0)),
-    "breast_tilt_left": _in_breast(lambda q, r: (0.0, 0.008 * r, 0.0)),
+    "breast_turn_left": _in_breast(lambda q, r: (0.010 * r, 0.0, -0.15 * q[:, 0] * r)),
+    "breast_tilt_left": _in_breast(lambda q, r: (0.0, 0.008 * r, -0.15 * q[:, 1] * r)),
     "breast_point_left": _in_breast(
         lambda q, r: (-0.08 * q[:, 0] * r, -0.08 * q[:, 1] * r, 0.006 * r**3)),
-    "breast_lower_pole_left": _swell(0.0, -0.035, (0.055, 0.045), 0.007),
-    "breast_upper_pole_left": _swell(0.0, 0.040, (0.060, 0.050), 0.007),
-    "breast_medial_pole_left": _swell(-0.040, 0.0, (0.045, 0.060), 0.006),
-    "breast_lateral_pole_left": _swell(0.045, 0.0, (0.045, 0.060), 0.006),
-    "breast_slope_left": _swell(0.005, 0.085, (0.070, 0.055), 0.007),
-    "breast_tail_left": _swell(0.055, 0.055, (0.055, 0.055), 0.007),
+    "breast_lower_pole_left": _swell(0.0, -0.035, (0.065, 0.055), 0.007),
+    "breast_upper_pole_left": _swell(0.0, 0.040, (0.070, 0.060), 0.007),
+    "breast_medial_pole_left": _swell(-0.040, 0.0, (0.055, 0.070), 0.006),
+    "breast_lateral_pole_left": _swell(0.045, 0.0, (0.055, 0.070), 0.006),
+    "breast_slope_left": _swell(0.005, 0.085, (0.080, 0.070), 0.007),
+    "breast_tail_left": _swell(0.055, 0.055, (0.060, 0.060), 0.007),
     "breast_fold_left": _swell(0.0, -0.068, (0.065, 0.032), -0.005),
     "breast_fold_lateral_left": _swell(0.066, -0.030, (0.040, 0.050), -0.005),
     "breast_cleavage_left": _swell(-0.070, 0.020, (0.035, 0.070), 0.005),
