@@ -11,7 +11,6 @@ Each has a confidence; what is not found is not proposed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,13 +23,19 @@ from supple.surface import Surface
 Floats = npt.NDArray[np.float64]
 
 #: More points than this are thinned: the maps' pixels hold several of them each.
-_POINTS = 60_000
+_POINTS = 40_000
 #: Breasts point this far outward, rad: on 110 averaged torsos 29°, on MakeHuman's body 26°.
 _OUTWARD = np.radians(25.0)
 #: m from the midline, between which nipples are sought, and their mean and sd.
 _NIPPLE_AT, _NIPPLE_MEAN = (0.04, 0.19), (0.105, 0.03)
 #: m that the nipples of a pair differ by, off the mirror (sd).
 _PAIR = 0.02
+#: m above the nipples, mean and sd over the shapes and poses of both templates; the sternum's
+#: length to the xiphoid; and the axillae's distance from the midline.
+_NOTCH_UP, _XIPHOID_UP, _AXILLA_UP = (0.157, 0.02), -0.034, (0.070, 0.015)
+_STERNUM, _AXILLA_ASIDE = 0.19, (0.150, 0.015)
+#: The notch lies at most this much deeper than the skin between the breasts, m.
+_DEEPEST = 0.10
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,18 +78,18 @@ def propose(
 def _found(points: Floats, likeness: float) -> dict[str, Proposal]:
     """Proposals in the frame whose plane of symmetry is x = 0."""
     sides = [_mounds(points, sign) for sign in (1.0, -1.0)]
-    found = _nipples(*sides, likeness)
+    found = _nipples(sides[0], sides[1], likeness)
     if not found:
         return {}
     front = seen_along(points, FRONT)
     level = float(np.mean([p.point[2] for p in found.values()]))
-    aside = float(np.mean([abs(p.point[0]) for p in found.values()]))
     sure = float(np.mean([p.confidence for p in found.values()]))
-    notch = _notch(front, level, likeness)
+    line = _profile(front).near_side(level)
+    notch = _notch(line, front.pixel, level, sure)
     if notch is not None:
         found["sternal_notch"] = notch
-        found |= _axillae(front, notch, level, aside, sure)
-    xiphoid = _xiphoid(front, notch, level, sure)
+    found |= _axillae(front, level, sure)
+    xiphoid = _xiphoid(line, notch, level, sure)
     return found | ({} if xiphoid is None else {"xiphoid": xiphoid})
 
 
@@ -154,83 +159,98 @@ def _worth(mound: _Mound) -> float:
     return 2.0 * min(mound.rise / 0.01, 2.5) - 0.5 * float(aside**2)
 
 
-def _profile(front: HeightMap, half: float = 0.012) -> tuple[Floats, Floats, Floats]:
-    """Up (k,), height (k,) m and how much was seen (k,) of the skin on the midline."""
-    from scipy.ndimage import gaussian_filter1d
+@dataclass(frozen=True, eq=False)
+class _Profile:
+    """The skin on the midline, (k,) each: up and height (m), slope, bend (1/m), share seen."""
 
+    up: Floats
+    height: Floats
+    slope: Floats
+    bend: Floats
+    seen: Floats
+
+    def near_side(self, level: float) -> _Profile:
+        """Without what lies too deep to be the front: the nape, seen through a hole."""
+        around = (np.abs(self.up - level) < 0.04) & (self.seen > 0.3)
+        if not around.any():
+            return self
+        deep = self.height < np.median(self.height[around]) - _DEEPEST
+        return _Profile(self.up, self.height, self.slope, self.bend, np.where(deep, 0.0, self.seen))
+
+
+def _profile(front: HeightMap, half: float = 0.014, sigma: float = 0.014) -> _Profile:
+    """Quadratics fitted to what is seen of the midline, each under a Gaussian of ``sigma`` m."""
     _, middle = front.at(0.0, 0.0)
     first, last = int(middle - half / front.pixel + 0.5), int(middle + half / front.pixel + 1.5)
-    seen = front.seen[:, max(first, 0) : max(last, 1)].sum(axis=1).astype(float)
-    total = front.height[:, max(first, 0) : max(last, 1)].sum(axis=1)
-    weight = gaussian_filter1d(seen, 0.010 / front.pixel, mode="constant")
-    value = gaussian_filter1d(total, 0.010 / front.pixel, mode="constant")
-    up = front.place(np.arange(len(seen)), 0)[1]
-    return up, value / np.maximum(weight, 1e-9), weight / max(last - first, 1)
+    strip = slice(max(first, 0), max(last, 1))
+    weight = front.seen[:, strip].sum(axis=1).astype(float)
+    total = front.height[:, strip].sum(axis=1)
+    steps = np.arange(-int(3 * sigma / front.pixel), int(3 * sigma / front.pixel) + 1)
+    z = steps * front.pixel / sigma
+    window = np.exp(-(z**2) / 2)
+    moments = [np.convolve(weight, (window * z**k)[::-1], "same") for k in range(5)]
+    means = [np.convolve(total, (window * z**k)[::-1], "same") for k in range(3)]
+    matrix = np.stack([np.stack([moments[i + j] for j in range(3)], -1) for i in range(3)], -2)
+    matrix = matrix + 1e-6 * np.eye(3) * (1 + moments[0][:, None, None])
+    fit = np.linalg.solve(matrix, np.stack(means, -1)[..., None])[..., 0]
+    up = front.place(np.arange(len(weight)), 0)[1]
+    full = window.sum() * max(last - first, 1)
+    return _Profile(up, fit[:, 0], fit[:, 1] / sigma, 2 * fit[:, 2] / sigma**2, moments[0] / full)
 
 
-def _notch(front: HeightMap, level: float, likeness: float) -> Proposal | None:
+def _notch(line: _Profile, step: float, level: float, trust: float) -> Proposal | None:
     """Above the nipples, where the slope has recovered a third of the way from chest to neck."""
-    up, height, weight = _profile(front)
-    slope = np.gradient(height, front.pixel)
-    bend = np.gradient(slope, front.pixel)
-    near = (up > level + 0.07) & (up < level + 0.26) & (weight > 0.25)
-    if near.sum() < 12:
+    rows = np.flatnonzero((np.abs(line.up - level - _NOTCH_UP[0]) < 0.06) & (line.seen > 0.4))
+    if len(rows) < 8:
         return None
-    rows = np.flatnonzero(near)
-    corner = rows[np.argmax(bend[rows] - 0.5 * ((up[rows] - level - 0.16) / 0.04) ** 2)]
-    below = rows[(rows <= corner) & (rows > corner - int(0.05 / front.pixel))]
-    above = rows[(rows >= corner) & (rows < corner + int(0.05 / front.pixel))]
-    steep = below[np.argmin(slope[below])]
-    low, high = float(slope[steep]), float(slope[above].max())
-    k = steep + int(np.argmax(slope[steep:] > low + 0.35 * (high - low)))
-    sure = _sigmoid(6.0 * (high - low - 0.45)) * float(min(weight[k], 1.0))
-    sure *= 0.5 + 0.5 * min(max(likeness, 0.0) / 0.5, 1.0)
-    point = np.array([0.0, -height[k], up[k]])
+    off = (line.up[rows] - level - _NOTCH_UP[0]) / _NOTCH_UP[1]
+    corner = rows[int(np.argmax(line.bend[rows] / 8 - 0.5 * off**2))]
+    below = rows[(rows <= corner) & (rows > corner - int(0.05 / step))]
+    above = rows[(rows >= corner) & (rows < corner + int(0.05 / step))]
+    steep = below[int(np.argmin(line.slope[below]))]
+    low, high = float(line.slope[steep]), float(line.slope[above].max())
+    k = min(steep + int(np.argmax(line.slope[steep:] > low + 0.35 * (high - low))), corner)
+    off = (line.up[k] - level - _NOTCH_UP[0]) / _NOTCH_UP[1]
+    clear = _sigmoid(5.0 * (high - low - 0.5)) * min(float(line.seen[k]), 1.0)
+    sure = trust * clear * float(np.exp(-0.25 * off**2))
+    point = np.array([0.0, -line.height[k], line.up[k]])
     return Proposal(point, sure, "corner between chest and neck on the midline")
 
 
 def _xiphoid(
-    front: HeightMap, notch: Proposal | None, level: float, sure: float
+    line: _Profile, notch: Proposal | None, level: float, trust: float
 ) -> Proposal | None:
-    """Mean of 0.19 m below the notch and 0.04 m below the nipples: the sternum's usual length."""
-    up, height, weight = _profile(front)
-    guess = level - 0.04
+    """Where the nipples, and a sternum of the usual length below the notch, put it."""
+    guess = level + _XIPHOID_UP
     if notch is not None:
-        guess = (guess + notch.point[2] - 0.19) / 2
-    k = int(np.argmin(np.abs(up - guess)))
-    if weight[k] < 0.2:
+        share = 0.4 * notch.confidence
+        guess += share * (float(notch.point[2]) - _STERNUM - guess)
+    k = int(np.argmin(np.abs(line.up - guess)))
+    if line.seen[k] < 0.3:
         return None
-    confidence = 0.5 * sure * (notch.confidence if notch is not None else 0.5)
-    return Proposal(np.array([0.0, -height[k], up[k]]), confidence,
+    return Proposal(np.array([0.0, -line.height[k], line.up[k]]), 0.5 * trust,
                     "midline, by the places of notch and nipples")  # fmt: skip
 
 
-def _axillae(
-    front: HeightMap, notch: Proposal, level: float, aside: float, sure: float
-) -> dict[str, Proposal]:
-    """The most hollow place of each side near where notch and nipples put it."""
+def _axillae(front: HeightMap, level: float, trust: float) -> dict[str, Proposal]:
+    """The most hollow place of each side near where the nipples put it."""
     smooth, weight = front.smooth(8e-3)
     mean, _ = curvatures(smooth, front.pixel)
     rows, columns = np.indices(mean.shape)
     across, up = front.place(rows, columns)
     found = {}
-    rise = float(notch.point[2]) - level
     for name, sign in (("axilla_left", 1.0), ("axilla_right", -1.0)):
-        off = (sign * across - 1.41 * aside) ** 2 + (up - level - 0.37 * rise) ** 2
-        score = np.where(weight > 0.4, mean / 10.0, -np.inf) - off / (2 * 0.03**2)
+        off = ((sign * across - _AXILLA_ASIDE[0]) / _AXILLA_ASIDE[1]) ** 2
+        off += ((up - level - _AXILLA_UP[0]) / _AXILLA_UP[1]) ** 2
+        score = np.where((weight > 0.5) & (off < 9), mean / 10 - off / 2, -np.inf)
         k = np.unravel_index(int(np.argmax(score)), score.shape)
         if not np.isfinite(score[k]):
             continue
         point = np.array([across[k], -smooth[k], up[k]])
-        confidence = 0.6 * sure * notch.confidence * _sigmoid(2.0 * (float(score[k]) - 0.5))
+        confidence = 0.35 * trust * _sigmoid(2.0 * (float(score[k]) - 0.3))
         found[name] = Proposal(point, confidence, "hollow between chest and arm")
     return found
 
 
 def _sigmoid(x: float) -> float:
     return float(1 / (1 + np.exp(-x)))
-
-
-def refine(scan: Surface, guesses: Mapping[str, npt.ArrayLike]) -> dict[str, Proposal]:
-    """What the scan shows within 20 mm of ``guesses``: name → (3,) m in the scan's frame."""
-    raise NotImplementedError

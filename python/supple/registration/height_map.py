@@ -10,8 +10,8 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-#: Skin this much deeper than the foremost of its rows is the far side, seen through a hole, m.
-_DEPTH = 0.15
+#: Skin that lies this much deeper, or further in front, than most of the near side is not of it, m.
+_DEPTH = 0.12
 #: Points this close behind the foremost of a pixel are of the same skin, m.
 _SKIN = 8e-3
 #: A pixel that differs by more than this from its neighbours' median is a speckle, m.
@@ -60,6 +60,8 @@ class HeightMap:
 def seen_along(points: Floats, axes: Floats, pixel: float = 4e-3) -> HeightMap:
     """The map of ``points`` (n, 3) m seen along ``axes`` (3, 3): rows across, up, to the viewer."""
     across, up, high = axes @ points.T
+    near = _near_side(up, high)
+    across, up, high = across[near], up[near], high[near]
     low = (float(across.min()) - 2 * pixel, float(up.min()) - 2 * pixel)
     column = ((across - low[0]) / pixel).astype(np.int64)
     row = ((up - low[1]) / pixel).astype(np.int64)
@@ -70,24 +72,26 @@ def seen_along(points: Floats, axes: Floats, pixel: float = 4e-3) -> HeightMap:
     skin = high > front[cell] - _SKIN
     count = np.bincount(cell[skin], minlength=rows * columns).reshape(rows, columns)
     total = np.bincount(cell[skin], high[skin], rows * columns).reshape(rows, columns)
-    height, seen = total / np.maximum(count, 1), count > 0
-    seen &= _near_side(height, seen)
-    height[~seen] = 0.0
-    return _despeckled(HeightMap(height, seen, low, pixel))
+    return _despeckled(HeightMap(total / np.maximum(count, 1), count > 0, low, pixel))
 
 
-def _near_side(height: Floats, seen: Mask) -> Mask:
-    """Pixels that are not much deeper than what lies foremost in the rows around."""
-    from scipy.ndimage import maximum_filter1d
+def _near_side(up: Floats, high: Floats) -> Mask:
+    """Which points are neither the far side, seen through a hole, nor something far in front.
 
-    values = np.where(seen, height, np.nan)
-    rows = np.flatnonzero(seen.sum(axis=1) > 5)
-    top = np.full(len(height), -np.inf)
-    for row in rows:
-        own = values[row][seen[row]]
-        top[row] = np.partition(own, int(0.95 * (len(own) - 1)))[int(0.95 * (len(own) - 1))]
-    top = maximum_filter1d(top, 9)
-    return np.asarray(np.where(seen, height, -np.inf) > top[:, None] - _DEPTH)
+    The near side is told by the upper third of the heights of all that is within 80 mm up or down.
+    """
+    level = ((up - up.min()) / 0.02).astype(np.int64)
+    bins = np.linspace(high.min(), high.max(), 100)
+    step = np.minimum(((high - bins[0]) / (bins[1] - bins[0])).astype(np.int64), 99)
+    count = np.bincount(level * 100 + step, minlength=(int(level.max()) + 1) * 100)
+    total = np.cumsum(count.reshape(-1, 100), axis=0)
+    reach = 4
+    low = np.maximum(np.arange(len(total)) - reach - 1, -1)
+    top = np.minimum(np.arange(len(total)) + reach, len(total) - 1)
+    around = total[top] - np.where(low[:, None] >= 0, total[np.maximum(low, 0)], 0)
+    share = np.cumsum(around, axis=1) / np.maximum(around.sum(axis=1, keepdims=True), 1)
+    front = bins[np.argmax(share > 0.75, axis=1)][level]
+    return np.asarray((high > front - _DEPTH) & (high < front + _DEPTH))
 
 
 def _despeckled(found: HeightMap) -> HeightMap:
