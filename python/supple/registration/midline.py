@@ -79,8 +79,8 @@ def _axis(view: HeightMap) -> tuple[float, float, float]:
         if ranked[k] > best[0]:
             best = (float(ranked[k]), float(np.arctan(slope)), float(across[k]))
             likeness = float(score[k])
-    tilt, across = best[1], best[2]
-    foot = np.array([across, 0.0, float(up.mean())])
+    tilt = best[1]
+    foot = np.array([best[2], 0.0, float(up.mean())])
     return -tilt, float((_about_y(-tilt) @ foot)[0]), likeness
 
 
