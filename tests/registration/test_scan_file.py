@@ -376,3 +376,15 @@ def test_cleaning_100000_points_takes_less_than_a_tenth_of_a_second():
         clean(surface)
         seconds.append(time.process_time() - start)
     assert min(seconds) < 0.2, seconds
+
+
+def test_the_visible_human_is_read_in_lps_as_it_is(shared):
+    """A closed glTF body of 1.67 m: feet down, nothing to mend, its nose and toes in front."""
+    scan = read_scan(shared / "data" / "skin_vhf" / "VH_F_Skin_v1.1.glb")
+    assert scan.unit == "m"
+    assert len(scan.said) == 2
+    points = scan.surface.points
+    np.testing.assert_allclose(np.ptp(points, axis=0), [0.967, 0.329, 1.667], atol=1e-3)
+    feet = points[points[:, 2] < points[:, 2].min() + 0.05]
+    assert np.ptp(feet[:, 1]) > 0.15
+    assert feet[:, 1].min() < np.median(points[:, 1]) - 0.05  # toes point to -y
