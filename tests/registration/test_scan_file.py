@@ -258,6 +258,22 @@ def test_a_scan_inside_out_is_turned_whole_or_in_part(part):
     assert said == ["The triangles faced inward: turned inside out."]
 
 
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_a_scan_in_many_pieces_is_turned_as_a_whole_or_not_at_all(noise):
+    """50 patches that hang together nowhere: a flat or hollow one does not turn by itself."""
+    points, triangles = body()
+    column, row = triangles[:, 0] % 90, triangles[:, 0] // 90
+    patches = triangles[(column % 9 > 0) & (row % 12 > 0)]
+    points = points + np.random.default_rng(0).normal(0, noise, points.shape)
+    surface, said = clean(Surface(points, patches))
+    np.testing.assert_array_equal(surface.triangles, patches)
+    assert len(said) == 1
+    assert "The scan is in 50 pieces" in said[0]
+    turned, said = clean(Surface(points, patches[:, ::-1]))
+    assert said[0] == "The triangles faced inward: turned inside out."
+    np.testing.assert_allclose(turned.normals, surface.normals, atol=1e-9)
+
+
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_triangles_turned_at_random_are_made_to_agree(share):
     points, triangles = body(part=0.5)
