@@ -1,0 +1,158 @@
+"""The procedural torso as a closed form: a level set that is negative inside; its normals.
+
+Sizes are those of an average adult woman: heights, breadths and girths of the 2012 survey of
+Gordon et al. (ANSUR II, Natick/TR-15/007), nipple and notch distances of Westreich (1997),
+Plast. Reconstr. Surg. 100, 468–479. The height z = 0 is that of the nipples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+Floats = npt.NDArray[np.float64]
+
+#: Trunk: height, half breadth, front, back (m), exponent of the superellipse.
+_TRUNK = np.array([
+    (-0.40, 0.188, -0.104, 0.132, 2.3),
+    (-0.31, 0.179, -0.117, 0.116, 2.3),
+    (-0.23, 0.160, -0.122, 0.090, 2.3),
+    (-0.15, 0.138, -0.115, 0.078, 2.35),
+    (-0.08, 0.137, -0.109, 0.084, 2.4),
+    (0.00, 0.144, -0.101, 0.098, 2.45),
+    (0.07, 0.141, -0.083, 0.105, 2.45),
+    (0.12, 0.124, -0.062, 0.105, 2.4),
+    (0.16, 0.096, -0.042, 0.098, 2.2),
+    (0.20, 0.060, -0.018, 0.088, 2.0),
+    (0.26, 0.040, -0.010, 0.070, 2.0),
+])  # fmt: skip
+
+SHOULDER = np.array([0.162, 0.024, 0.110])  #: centre of the left humeral head, m
+ARM = np.array([0.44, 0.02, -0.90]) / np.linalg.norm([0.44, 0.02, -0.90])  #: along the left arm
+NECK = np.array([0.0, 0.040, 0.150])  #: base of the neck, m
+NECK_AXIS = np.array([0.0, -0.17, 0.985]) / np.linalg.norm([0.17, 0.985])
+BREAST = np.array([0.085, -0.092, -0.008])  #: centre of the left breast's base, m
+_OUT = np.radians(17.0)  # by which breasts look to the side
+BREAST_AXES = np.array([
+    (np.cos(_OUT), np.sin(_OUT), 0.0),
+    (0.0, 0.0, 1.0),
+    (np.sin(_OUT), -np.cos(_OUT), 0.0),
+])  #: rows: to the side, up, to the front of the left breast  # fmt: skip
+NIPPLE = np.array([0.008, -0.006, 0.0550])  #: in the breast's axes, m
+
+
+def level(points: Floats) -> Floats:
+    """Nearly the signed distance (n,) m of ``points`` (n, 3) m to the skin, cuts left out."""
+    p = np.stack([np.hypot(points[:, 0], 0.006), points[:, 1], points[:, 2]], axis=1)
+    body = smooth_min(trunk(p), shoulder_girdle(p), 0.05)
+    body = smooth_min(body, neck(p), 0.035)
+    body = smooth_min(body, arm(p), 0.040)
+    return smooth_min(body, *breast(p))
+
+
+def slope(points: Floats, step: float = 1e-5) -> Floats:
+    """Gradient (n, 3) of the level set at ``points`` (n, 3) m, by central differences."""
+    moves = step * np.eye(3)
+    ahead, behind = (level((points + way * moves[:, None]).reshape(-1, 3)) for way in (1, -1))
+    return np.asarray(((ahead - behind) / (2 * step)).reshape(3, -1).T)
+
+
+def normals(points: Floats) -> Floats:
+    """Unit outward normals (n, 3) at ``points`` (n, 3) m."""
+    g = slope(points)
+    return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
+
+
+def met(start: Floats, way: Floats, surface: Callable[[Floats], Floats] | None = None) -> Floats:
+    """Where rays from ``start`` (n, 3) m outside along unit ``way`` meet the skin first, (n, 3) m.
+
+    By sphere tracing, for the level set's slope is near 1.
+    """
+    at = start.copy()
+    for _ in range(40):
+        at += 0.8 * (surface or level)(at)[:, None] * way
+    return at
+
+
+def smooth_min(a: Floats, b: Floats, width: Floats | float) -> Floats:
+    """The lesser of both, twice differentiable where they are within ``width`` of each other."""
+    near = np.maximum(width - np.abs(a - b), 0.0) / width
+    return np.asarray(np.minimum(a, b) - near**3 * (width / 6))
+
+
+def trunk(p: Floats) -> Floats:
+    """Superelliptic cross sections along the height, with the furrows of spine and sternum."""
+    breadth, front, back, power = _profile()(np.clip(p[:, 2], *_TRUNK[[0, -1], 0])).T
+    depth, y = (back - front) / 2, p[:, 1] - (back + front) / 2
+    power_sum = (np.abs(p[:, 0]) / breadth) ** power + np.abs(y / depth) ** power + 1e-12
+    outside = power_sum ** (1 / power) - 1
+    return np.asarray(outside * np.minimum(breadth, depth) + _furrows(p))
+
+
+def _furrows(p: Floats) -> Floats:
+    behind = 1 / (1 + np.exp(-(p[:, 1] - 0.02) / 0.015))
+    spine = 0.009 * np.exp(-((p[:, 0] / 0.022) ** 2)) * np.exp(-(((p[:, 2] + 0.07) / 0.15) ** 4))
+    sternum = 0.004 * np.exp(-((p[:, 0] / 0.03) ** 2)) * np.exp(-(((p[:, 2] - 0.03) / 0.09) ** 4))
+    return np.asarray(spine * behind + sternum * (1 - behind))
+
+
+@cache
+def _profile() -> CubicSpline:
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(_TRUNK[:, 0], _TRUNK[:, 1:])
+
+
+def shoulder_girdle(p: Floats) -> Floats:
+    """From the neck's base over the clavicle and the trapezius to the acromion."""
+    collar = cone(p, (0.020, 0.030, 0.132), (0.150, 0.028, 0.116), 0.046, 0.042)
+    slope = cone(p, (0.010, 0.052, 0.222), (0.150, 0.040, 0.124), 0.030, 0.033)
+    return smooth_min(collar, slope, 0.04)
+
+
+def neck(p: Floats) -> Floats:
+    """A slightly flat, forward-leaning cylinder."""
+    return cone(p, tuple(NECK), tuple(NECK + 0.25 * NECK_AXIS), 0.055, 0.0515)
+
+
+def arm(p: Floats) -> Floats:
+    """Deltoid and upper arm, |x| taken."""
+    upper = cone(p, tuple(SHOULDER), tuple(SHOULDER + 0.30 * ARM), 0.048, 0.041)
+    deltoid = ellipsoid(p - (SHOULDER + 0.040 * ARM), (0.048, 0.053, 0.086))
+    return smooth_min(upper, deltoid, 0.03)
+
+
+def breast(p: Floats) -> tuple[Floats, Floats]:
+    """A full lower pole, a flatter slope above, areola and nipple; how softly it joins the chest.
+
+    The lower fold is sharp; above, the breast fades into the chest.
+    """
+    q = (p - BREAST) @ BREAST_AXES.T
+    pole = ellipsoid(q - (0.003, -0.011, 0.0), (0.060, 0.056, 0.051))
+    slope = ellipsoid(q - (-0.002, 0.026, -0.030), (0.058, 0.080, 0.046))
+    mound = smooth_min(pole, slope, 0.05)
+    areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
+    nipple = np.linalg.norm(q - NIPPLE, axis=1) - 0.0055
+    softness = 0.021 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
+    return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
+
+
+def cone(p: Floats, a: tuple[float, ...], b: tuple[float, ...], ra: float, rb: float) -> Floats:
+    """Distance to a segment from ``a`` to ``b`` less a radius that goes from ``ra`` to ``rb``."""
+    along = np.subtract(b, a)
+    s = np.clip((p - a) @ along / (along @ along), 0, 1)
+    return np.asarray(np.linalg.norm(p - a - s[:, None] * along, axis=1) - ra - s * (rb - ra))
+
+
+def ellipsoid(p: Floats, radii: tuple[float, ...]) -> Floats:
+    """Nearly the distance to an ellipsoid at the origin; exact to first order at its surface."""
+    r = np.asarray(radii)
+    scaled = np.linalg.norm(p / r, axis=1)
+    return np.asarray(scaled * (scaled - 1) / (np.linalg.norm(p / r**2, axis=1) + 1e-9))

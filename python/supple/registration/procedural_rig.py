@@ -1,0 +1,85 @@
+"""Bones of the procedural torso: joints, and weights as closed forms of the place."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from supple.registration import procedural_body as body
+from supple.registration.template import BONES, Bone
+
+Floats = npt.NDArray[np.float64]
+
+#: Joints of the midline and of the left, m.
+_JOINTS = {
+    "abdomen": (0.0, 0.045, -0.24),
+    "chest": (0.0, 0.040, -0.11),
+    "neck": (0.0, 0.055, 0.165),
+    "shoulder": (0.025, -0.025, 0.135),
+    "arm": tuple(body.SHOULDER.tolist()),
+    "breast": tuple(body.BREAST.tolist()),
+}
+#: The breast's base: middle and half axes, m, to the side and up, in its axes.
+BASE, BASE_RADII = np.array([0.002, 0.010]), np.array([0.064, 0.072])
+
+
+def bones() -> tuple[Bone, ...]:
+    """The nine, parents before children."""
+    return tuple(Bone(name, parent, _joint(name)) for name, parent in BONES)
+
+
+def _joint(name: str) -> tuple[float, float, float]:
+    x, y, z = _JOINTS[name.split("_")[0]]
+    return (-x if name.endswith("_right") else x, y, z)
+
+
+def weights(points: Floats) -> Floats:
+    """(n, 9) of the bones at ``points`` (n, 3) m: ≥ 0, rows sum to 1, smooth in the place."""
+    p = left(points)
+    arm, rest = _split(np.ones(len(p)), arm_part(p))
+    shoulder, rest = _split(
+        rest, smooth((p[:, 0] - 0.045) / 0.09) * smooth((p[:, 2] - 0.05) / 0.08)
+    )
+    neck, rest = _split(rest, smooth(((p - body.NECK) @ body.NECK_AXIS + 0.005) / 0.08))
+    breast, rest = _split(rest, smooth((1.15 - breast_radius(p)) / 0.9))
+    chest, abdomen = _split(rest, smooth((p[:, 2] + 0.18) / 0.15))
+    parts = {"arm": arm, "shoulder": shoulder, "neck": neck, "breast": breast, "chest": chest,
+             "abdomen": abdomen}  # fmt: skip
+    columns = [parts[name.split("_")[0]] * _on_side(name, points) for name, _ in BONES]
+    whole = np.stack(columns, axis=1)
+    return np.asarray(whole / whole.sum(axis=1, keepdims=True))
+
+
+def _split(whole: Floats, share: Floats) -> tuple[Floats, Floats]:
+    return whole * share, whole * (1 - share)
+
+
+def _on_side(name: str, points: Floats) -> Floats:
+    x = points[:, 0]
+    if name.endswith("_left"):
+        return np.asarray((x > 0).astype(float))
+    return np.asarray((x < 0).astype(float) if name.endswith("_right") else np.ones(len(x)))
+
+
+def left(points: Floats) -> Floats:
+    """``points`` (n, 3), those on the right mirrored to the left."""
+    return np.stack([np.abs(points[:, 0]), points[:, 1], points[:, 2]], axis=1)
+
+
+def smooth(t: Floats) -> Floats:
+    """From 0 at t ≤ 0 to 1 at t ≥ 1, twice differentiable (Perlin's polynomial)."""
+    t = np.clip(t, 0, 1)
+    return np.asarray(t**3 * (10 - 15 * t + 6 * t**2))
+
+
+def arm_part(p: Floats) -> Floats:
+    """How much (n,) each point on the left belongs to the arm: by its place along and off it."""
+    along = (p - body.SHOULDER) @ body.ARM
+    return smooth((along + 0.045) / 0.09) * smooth((body.trunk(p) - body.arm(p) + 0.01) / 0.05)
+
+
+def breast_radius(p: Floats) -> Floats:
+    """Place (n,) on the left breast: 0 at the middle of its base, 1 on its outline, 9 behind."""
+    q = (p - body.BREAST) @ body.BREAST_AXES.T
+    radius = np.linalg.norm((q[:, :2] - BASE) / BASE_RADII, axis=1)
+    return np.asarray(np.where(q[:, 2] > -0.045, radius, 9.0))
