@@ -189,6 +189,27 @@ void bind_rig(py::module_& module) {
           },
           Unlocked())
       .def_property_readonly("scan", &RigFit::scan, py::return_value_policy::copy)
+      .def("evaluate",
+           [](RigFit& fit, const py::tuple& pairs_at, const py::tuple& at,
+              const supple::RigWeights& weights, const supple::RigPriors& priors,
+              const supple::RigStage& stage, const Eigen::VectorXi& triangle,
+              const Points& barycentric, const Points& target, const VectorXd& sd) {
+             const auto from = [](const py::tuple& parts) {
+               return posture(parts[0].cast<Array>(), parts[1].cast<Points>(),
+                              parts[2].cast<Points>(), parts[3].cast<VectorXd>());
+             };
+             const RigPosture one = from(pairs_at), other = from(at);
+             const supple::RigLandmarks landmarks{triangle, barycentric, target, sd};
+             return unlocked<supple::RigEvaluation>(
+                 [&] { return fit.evaluate(one, other, weights, priors, stage, landmarks); });
+           })
+      .def("land",
+           [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
+              const Points& points) {
+             const RigPosture at = posture(R, t, s, b);
+             const auto landed = unlocked<supple::RigLanding>([&] { return fit.land(at, points); });
+             return py::make_tuple(landed.triangle, landed.barycentric, landed.distance);
+           })
       .def("run",
            [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
               const supple::RigWeights& weights, const supple::RigPriors& priors,

@@ -133,13 +133,15 @@ class Run {
     return free_step(rig_, *state_, priors_, moves, normal_, damping, step);
   }
 
+  /// Matrices are of the rows that the last iteration used, whose weights stand for all; pairs and
+  /// what they say are those of all points.
   void report(RigStage stage) {
+    report_matrices();
     stage.every_point = stage.every_vertex = 1;
     matcher_.match(*state_, stage, weights_, priors_, pairs_);
     need_pairs(stage);
     result_.posture = state_->posture;
     result_.terms = terms();
-    report_matrices();
     report_spread();
     report_pairs();
   }
@@ -258,6 +260,10 @@ RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                          const RigPriors& priors, const std::vector<RigStage>& stages,
                          const RigLandmarks& landmarks) {
   check_ready(start);
+  for (const RigStage& stage : stages)
+    if (stage.iterations < 1)
+      throw ShapeError("a stage must have an iteration at least, got " +
+                       std::to_string(stage.iterations) + "; leave the stage out");
   if (stages.empty()) throw ShapeError("stages must be one at least, got none; give a schedule");
   Run run(*state_->rig, state_->matcher, state_->sums, weights, priors, landmarks, start);
   return run.through(stages);

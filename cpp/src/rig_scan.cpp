@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -159,10 +160,13 @@ void uncurve(Around& around, double size, double radius, Points& points) {
       points.row(i) -= square / (disc - square) * around.dip[i] * around.normal.row(i);
 }
 
-/// `normals` of the neighbours' spread, turned to the side of `sides`.
+/// `normals` of the neighbours' spread, turned to the side of `sides`, which take their place where
+/// there are no neighbours.
 void turn_to(const Points& sides, Points& normals) {
-  for (Index i = 0; i < normals.rows(); ++i)
+  for (Index i = 0; i < normals.rows(); ++i) {
+    if (normals.row(i).isZero(0.0)) normals.row(i) = sides.row(i);
     if (normals.row(i).dot(sides.row(i)) < 0.0) normals.row(i) *= -1.0;
+  }
 }
 
 void unit_normals(Points& normals) {
@@ -208,14 +212,25 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
                    const ScanSettings& settings) {
   check(points, triangles, normals, settings.voxel);
   const bool meshed = triangles.rows() > 0, given = normals.rows() > 0;
-  const Voxels voxels(points, settings.voxel);
-  const Points found = given ? normals : meshed ? triangle_normals(points, triangles) : Points();
-  const std::vector<char> border =
-      meshed ? triangle_borders(points.rows(), triangles) : std::vector<char>();
+  std::optional<Voxels> voxels;
+  Points found;
+  std::vector<char> border;
+#pragma omp parallel sections
+  {
+#pragma omp section
+    voxels.emplace(points, settings.voxel);
+#pragma omp section
+    if (given)
+      found = normals;
+    else if (meshed)
+      found = triangle_normals(points, triangles);
+#pragma omp section
+    if (meshed) border = triangle_borders(points.rows(), triangles);
+  }
   ScanCloud cloud;
   Eigen::VectorXd held;
   if (settings.thin) {
-    cloud = merged(points, found, border, voxels, held);
+    cloud = merged(points, found, border, *voxels, held);
   } else {
     held.setOnes(points.rows());
     cloud.points = points;
