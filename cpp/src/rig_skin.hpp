@@ -1,6 +1,7 @@
 /// The skinning of one vertex, for any scalar, and its derivatives; private to the runtime.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -101,6 +102,26 @@ struct SkinState {
     }
   }
 
+  /// add(column, ∂(d·Σ_c share_c v_c)/∂unknown): the corners' bones are mostly the same, whose
+  /// columns are linear in Σ share w and Σ share w x.
+  template <class Add>
+  void add_point(const std::array<int, 3>& vertex, const std::array<double, 3>& share,
+                 const Vec3& d, const Add& add) const {
+    if (dual) {
+      for (std::size_t c = 0; c < 3; ++c)
+        if (share[c] != 0.0) add_row(vertex[c], share[c] * d, add);
+      return;
+    }
+    Sums sums;
+    for (std::size_t c = 0; c < 3; ++c)
+      if (share[c] != 0.0 && !sums.add(rig, vertex[c], share[c], shape.row(vertex[c]).transpose()))
+        add_linear(vertex[c], share[c] * d, add);
+    for (std::size_t b = 0; b < sums.count; ++b)
+      add_sum(sums.bone[b], sums.weight[b], sums.arm[b], d, add);
+    for (std::size_t c = 0; c < 3; ++c)
+      if (share[c] != 0.0) add_shapes(vertex[c], share[c] * d, add);
+  }
+
   /// add(column, ∂(d·v_i)/∂unknown) for every unknown that moves vertex i.
   template <class Add>
   void add_row(int i, const Vec3& d, const Add& add) const {
@@ -108,12 +129,53 @@ struct SkinState {
       add_dual(i, d, add);
     else
       add_linear(i, d, add);
+    add_shapes(i, d, add);
+  }
+
+ private:
+  /// Of each bone Σ share w, and Σ share w (x − j).
+  struct Sums {
+    static constexpr std::size_t kMost = 16;
+    std::size_t count = 0;
+    std::array<int, kMost> bone;
+    std::array<double, kMost> weight;
+    std::array<Vec3, kMost> arm;
+
+    /// False, and nothing added, if there might be no room.
+    bool add(const Rig& rig, int i, double share, const Vec3& x) {
+      const Part<BoneWeight> all = rig.bones_at(i);
+      if (count + static_cast<std::size_t>(all.end() - all.begin()) > kMost) return false;
+      for (const BoneWeight& at : all) {
+        std::size_t b = 0;
+        while (b < count && bone[b] != at.bone)
+          ++b;
+        if (b == count) {
+          bone[count] = at.bone;
+          weight[count] = 0.0;
+          arm[count++].setZero();
+        }
+        weight[b] += share * at.weight;
+        arm[b] += share * at.weight * (x - rig.joint(at.bone));
+      }
+      return true;
+    }
+  };
+
+  template <class Add>
+  void add_sum(int bone, double weight, const Vec3& arm, const Vec3& d, const Add& add) const {
+    const std::size_t k = static_cast<std::size_t>(bone);
+    const Vec3 lever = bones.affine[k] * arm;
+    add_bone(bone, lever.cross(d), weight * d,
+             (posture.rotations[k].transpose() * d).cwiseProduct(arm), add);
+  }
+
+  template <class Add>
+  void add_shapes(int i, const Vec3& d, const Add& add) const {
     const Vec3 pull = gradient[static_cast<std::size_t>(i)].transpose() * d;
     for (const ShapeOffset& at : rig.shapes_at(i))
       add(9 * rig.bones() + at.shape, pull.dot(at.offset));
   }
 
- private:
   template <class Add>
   static void add_bone(int bone, const Vec3& turn, const Vec3& push, const Vec3& stretch,
                        const Add& add) {
@@ -127,13 +189,8 @@ struct SkinState {
   template <class Add>
   void add_linear(int i, const Vec3& d, const Add& add) const {
     const Vec3 x = shape.row(i).transpose();
-    for (const BoneWeight& at : rig.bones_at(i)) {
-      const std::size_t k = static_cast<std::size_t>(at.bone);
-      const Vec3 arm = x - rig.joint(at.bone), push = at.weight * d;
-      const Vec3 lever = bones.affine[k] * arm;
-      add_bone(at.bone, lever.cross(push), push,
-               (posture.rotations[k].transpose() * push).cwiseProduct(arm), add);
-    }
+    for (const BoneWeight& at : rig.bones_at(i))
+      add_sum(at.bone, at.weight, at.weight * (x - rig.joint(at.bone)), d, add);
   }
 
   template <class Add>
