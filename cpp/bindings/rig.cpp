@@ -82,6 +82,7 @@ void bind_settings(py::module_& module) {
           [](RigStage& stage, int moves) { stage.moves = static_cast<Moves>(moves); })
       .def_readwrite("iterations", &RigStage::iterations)
       .def_readwrite("tolerance", &RigStage::tolerance)
+      .def_readwrite("flat", &RigStage::flat)
       .def_readwrite("reach", &RigStage::reach)
       .def_readwrite("loss", &RigStage::loss)
       .def_readwrite("angle", &RigStage::angle)
@@ -113,6 +114,17 @@ void bind_result(py::module_& module) {
                                return border;
                              })
       .def_readonly("oriented", &ScanCloud::oriented);
+  using supple::RigEvaluation;
+  py::class_<RigEvaluation>(module, "RigEvaluation")
+      .def_readonly("terms", &RigEvaluation::terms)
+      .def_readonly("gradient", &RigEvaluation::gradient)
+      .def_readonly("matrix", &RigEvaluation::matrix)
+      .def_readonly("vertex", &RigEvaluation::vertex)
+      .def_readonly("share", &RigEvaluation::share)
+      .def_readonly("direction", &RigEvaluation::direction)
+      .def_readonly("target", &RigEvaluation::target)
+      .def_readonly("weight", &RigEvaluation::weight)
+      .def_readonly("loss", &RigEvaluation::loss);
   py::class_<RigFitResult>(module, "RigFitResult")
       .def_property_readonly("posture",
                              [](const RigFitResult& result) { return arrays(result.posture); })
@@ -177,6 +189,27 @@ void bind_rig(py::module_& module) {
           },
           Unlocked())
       .def_property_readonly("scan", &RigFit::scan, py::return_value_policy::copy)
+      .def("evaluate",
+           [](RigFit& fit, const py::tuple& pairs_at, const py::tuple& at,
+              const supple::RigWeights& weights, const supple::RigPriors& priors,
+              const supple::RigStage& stage, const Eigen::VectorXi& triangle,
+              const Points& barycentric, const Points& target, const VectorXd& sd) {
+             const auto from = [](const py::tuple& parts) {
+               return posture(parts[0].cast<Array>(), parts[1].cast<Points>(),
+                              parts[2].cast<Points>(), parts[3].cast<VectorXd>());
+             };
+             const RigPosture one = from(pairs_at), other = from(at);
+             const supple::RigLandmarks landmarks{triangle, barycentric, target, sd};
+             return unlocked<supple::RigEvaluation>(
+                 [&] { return fit.evaluate(one, other, weights, priors, stage, landmarks); });
+           })
+      .def("land",
+           [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
+              const Points& points) {
+             const RigPosture at = posture(R, t, s, b);
+             const auto landed = unlocked<supple::RigLanding>([&] { return fit.land(at, points); });
+             return py::make_tuple(landed.triangle, landed.barycentric, landed.distance);
+           })
       .def("run",
            [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
               const supple::RigWeights& weights, const supple::RigPriors& priors,

@@ -61,12 +61,9 @@ void NormalSum::add_chunk(const Row* first, const Row* last, const SkinState& st
     const double root = std::sqrt(row.weight * loss_weight(residual, row.loss));
     part.residual[i] = root * residual;
     double* const column = part.panel.col(i).data();
-    for (std::size_t c = 0; c < 3; ++c)
-      if (row.share[c] != 0.0)
-        state.add_row(row.vertex[c], root * row.share[c] * row.direction,
-                      [&](int unknown, double value) {
-                        column[part.place[static_cast<std::size_t>(unknown)]] += value;
-                      });
+    state.add_point(row.vertex, row.share, root * row.direction, [&](int unknown, double value) {
+      column[part.place[static_cast<std::size_t>(unknown)]] += value;
+    });
   }
   part.product.setZero(width, width);
   part.product.selfadjointView<Eigen::Lower>().rankUpdate(part.panel);

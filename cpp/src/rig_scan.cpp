@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -112,6 +113,7 @@ struct Around {
   Points normal;         ///< along their least spread; 0 of fewer than four
   Eigen::VectorXd share; ///< m² of the surface: the disc over what its points hold, times its own
   std::vector<char> border; ///< they lie to one side
+  Eigen::VectorXd dip;      ///< m, along the normal: their mean against the point
 };
 
 /// `held`: scan points that each of the cloud's stands for. The mean of a half disc is 0.42 of its
@@ -120,7 +122,7 @@ Around look_around(const Points& points, const Eigen::VectorXd& held, const Poin
                    double radius) {
   const Index n = points.rows();
   Around found{Points::Zero(n, 3), Eigen::VectorXd(n),
-               std::vector<char>(static_cast<std::size_t>(n))};
+               std::vector<char>(static_cast<std::size_t>(n)), Eigen::VectorXd::Zero(n)};
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < n; ++i) {
     const Vec3 centre = points.row(i).transpose();
@@ -140,6 +142,7 @@ Around look_around(const Points& points, const Eigen::VectorXd& held, const Poin
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread;
       spread.computeDirect(moment / all - mean * mean.transpose());
       found.normal.row(i) = spread.eigenvectors().col(0).transpose();
+      found.dip[i] = mean.dot(spread.eigenvectors().col(0));
     }
     const double aside = mean.norm() / radius;
     found.share[i] = kPi * radius * radius * std::max(1.0 - 1.18 * aside, 0.3) * held[i] / all;
@@ -148,10 +151,22 @@ Around look_around(const Points& points, const Eigen::VectorXd& held, const Poin
   return found;
 }
 
-/// `normals` of the neighbours' spread, turned to the side of `sides`.
+/// Puts means back on a curved surface. The mean of a square of side h is h²/12 · H off it, H the
+/// mean curvature; that of a disc of radius r, r²/4 · H: the difference is what `dip` measures.
+void uncurve(Around& around, double size, double radius, Points& points) {
+  const double square = size * size / 12.0, disc = radius * radius / 4.0;
+  for (Index i = 0; i < points.rows(); ++i)
+    if (!around.border[static_cast<std::size_t>(i)])
+      points.row(i) -= square / (disc - square) * around.dip[i] * around.normal.row(i);
+}
+
+/// `normals` of the neighbours' spread, turned to the side of `sides`, which take their place where
+/// there are no neighbours.
 void turn_to(const Points& sides, Points& normals) {
-  for (Index i = 0; i < normals.rows(); ++i)
+  for (Index i = 0; i < normals.rows(); ++i) {
+    if (normals.row(i).isZero(0.0)) normals.row(i) = sides.row(i);
     if (normals.row(i).dot(sides.row(i)) < 0.0) normals.row(i) *= -1.0;
+  }
 }
 
 void unit_normals(Points& normals) {
@@ -197,14 +212,25 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
                    const ScanSettings& settings) {
   check(points, triangles, normals, settings.voxel);
   const bool meshed = triangles.rows() > 0, given = normals.rows() > 0;
-  const Voxels voxels(points, settings.voxel);
-  const Points found = given ? normals : meshed ? triangle_normals(points, triangles) : Points();
-  const std::vector<char> border =
-      meshed ? triangle_borders(points.rows(), triangles) : std::vector<char>();
+  std::optional<Voxels> voxels;
+  Points found;
+  std::vector<char> border;
+#pragma omp parallel sections
+  {
+#pragma omp section
+    voxels.emplace(points, settings.voxel);
+#pragma omp section
+    if (given)
+      found = normals;
+    else if (meshed)
+      found = triangle_normals(points, triangles);
+#pragma omp section
+    if (meshed) border = triangle_borders(points.rows(), triangles);
+  }
   ScanCloud cloud;
   Eigen::VectorXd held;
   if (settings.thin) {
-    cloud = merged(points, found, border, voxels, held);
+    cloud = merged(points, found, border, *voxels, held);
   } else {
     held.setOnes(points.rows());
     cloud.points = points;
@@ -214,6 +240,7 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
   cloud.oriented = given || meshed;
   const PointTree tree(cloud.points);
   Around around = look_around(cloud.points, held, tree, 2.2 * settings.voxel);
+  if (settings.thin) uncurve(around, settings.voxel, 2.2 * settings.voxel, cloud.points);
   if (!given) {
     if (meshed) turn_to(cloud.normals, around.normal);
     cloud.normals.swap(around.normal);

@@ -1,10 +1,12 @@
 /// The skinning of one vertex, for any scalar, and its derivatives; private to the runtime.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
-#include "supple/rig.hpp"
+#include "rig_dual.hpp"
 
 namespace supple {
 
@@ -78,9 +80,11 @@ struct LinearBones {
 
 /// A posed skin and what its derivatives need.
 struct SkinState {
+  using Vec3 = Eigen::Vector3d;
   const Rig& rig;
   RigPosture posture;
   LinearBones<double> bones;
+  std::optional<DualBones<double>> dual;
   Points shape;                          ///< (n, 3) m, x
   Points points;                         ///< (n, 3) m, v
   std::vector<Eigen::Matrix3d> gradient; ///< ∂v/∂x
@@ -88,33 +92,142 @@ struct SkinState {
   SkinState(const Rig& of, const RigPosture& at)
       : rig(of), posture(at), bones(of, at), shape(of.vertices(), 3), points(of.vertices(), 3),
         gradient(static_cast<std::size_t>(of.vertices())) {
+    if (rig.skinning() == Skinning::DualQuaternion) dual.emplace(rig, posture);
 #pragma omp parallel for schedule(static)
     for (int i = 0; i < rig.vertices(); ++i) {
-      const Eigen::Vector3d x = shape_at<double>(rig, posture.blend, i);
+      const Vec3 x = shape_at<double>(rig, posture.blend, i);
       shape.row(i) = x.transpose();
-      points.row(i) = bones.vertex(rig, i, x).transpose();
-      gradient[static_cast<std::size_t>(i)] = bones.gradient(rig, i);
+      points.row(i) = (dual ? dual->vertex(rig, i, x) : bones.vertex(rig, i, x)).transpose();
+      gradient[static_cast<std::size_t>(i)] = dual ? dual_gradient(i) : bones.gradient(rig, i);
     }
+  }
+
+  /// add(column, ∂(d·Σ_c share_c v_c)/∂unknown): the corners' bones are mostly the same, whose
+  /// columns are linear in Σ share w and Σ share w x.
+  template <class Add>
+  void add_point(const std::array<int, 3>& vertex, const std::array<double, 3>& share,
+                 const Vec3& d, const Add& add) const {
+    if (dual) {
+      for (std::size_t c = 0; c < 3; ++c)
+        if (share[c] != 0.0) add_row(vertex[c], share[c] * d, add);
+      return;
+    }
+    Sums sums;
+    for (std::size_t c = 0; c < 3; ++c)
+      if (share[c] != 0.0 && !sums.add(rig, vertex[c], share[c], shape.row(vertex[c]).transpose()))
+        add_linear(vertex[c], share[c] * d, add);
+    for (std::size_t b = 0; b < sums.count; ++b)
+      add_sum(sums.bone[b], sums.weight[b], sums.arm[b], d, add);
+    for (std::size_t c = 0; c < 3; ++c)
+      if (share[c] != 0.0) add_shapes(vertex[c], share[c] * d, add);
   }
 
   /// add(column, ∂(d·v_i)/∂unknown) for every unknown that moves vertex i.
   template <class Add>
-  void add_row(int i, const Eigen::Vector3d& d, const Add& add) const {
-    const Eigen::Vector3d x = shape.row(i).transpose();
+  void add_row(int i, const Vec3& d, const Add& add) const {
+    if (dual)
+      add_dual(i, d, add);
+    else
+      add_linear(i, d, add);
+    add_shapes(i, d, add);
+  }
+
+ private:
+  /// Of each bone Σ share w, and Σ share w (x − j).
+  struct Sums {
+    static constexpr std::size_t kMost = 16;
+    std::size_t count = 0;
+    std::array<int, kMost> bone;
+    std::array<double, kMost> weight;
+    std::array<Vec3, kMost> arm;
+
+    /// False, and nothing added, if there might be no room.
+    bool add(const Rig& rig, int i, double share, const Vec3& x) {
+      const Part<BoneWeight> all = rig.bones_at(i);
+      if (count + static_cast<std::size_t>(all.end() - all.begin()) > kMost) return false;
+      for (const BoneWeight& at : all) {
+        std::size_t b = 0;
+        while (b < count && bone[b] != at.bone)
+          ++b;
+        if (b == count) {
+          bone[count] = at.bone;
+          weight[count] = 0.0;
+          arm[count++].setZero();
+        }
+        weight[b] += share * at.weight;
+        arm[b] += share * at.weight * (x - rig.joint(at.bone));
+      }
+      return true;
+    }
+  };
+
+  template <class Add>
+  void add_sum(int bone, double weight, const Vec3& arm, const Vec3& d, const Add& add) const {
+    const std::size_t k = static_cast<std::size_t>(bone);
+    const Vec3 lever = bones.affine[k] * arm;
+    add_bone(bone, lever.cross(d), weight * d,
+             (posture.rotations[k].transpose() * d).cwiseProduct(arm), add);
+  }
+
+  template <class Add>
+  void add_shapes(int i, const Vec3& d, const Add& add) const {
+    const Vec3 pull = gradient[static_cast<std::size_t>(i)].transpose() * d;
+    for (const ShapeOffset& at : rig.shapes_at(i))
+      add(9 * rig.bones() + at.shape, pull.dot(at.offset));
+  }
+
+  template <class Add>
+  static void add_bone(int bone, const Vec3& turn, const Vec3& push, const Vec3& stretch,
+                       const Add& add) {
+    for (int c = 0; c < 3; ++c) {
+      add(9 * bone + c, turn[c]);
+      add(9 * bone + 3 + c, push[c]);
+      add(9 * bone + 6 + c, stretch[c]);
+    }
+  }
+
+  template <class Add>
+  void add_linear(int i, const Vec3& d, const Add& add) const {
+    const Vec3 x = shape.row(i).transpose();
+    for (const BoneWeight& at : rig.bones_at(i))
+      add_sum(at.bone, at.weight, at.weight * (x - rig.joint(at.bone)), d, add);
+  }
+
+  template <class Add>
+  void add_dual(int i, const Vec3& d, const Add& add) const {
+    const Vec3 x = shape.row(i).transpose(), u = dual->scaled(rig, i, x);
+    const auto blend = dual->blend(rig, i);
+    const Vec3 back = turn_of_blend(blend).transpose() * d;
+    Quaternion<double> of_real, of_dual;
+    pull_back(blend, u, d, of_real, of_dual);
+    const std::size_t heavy = DualBones<double>::heaviest(rig, i);
     for (const BoneWeight& at : rig.bones_at(i)) {
       const std::size_t k = static_cast<std::size_t>(at.bone);
-      const Eigen::Vector3d arm = x - rig.joint(at.bone), push = at.weight * d;
-      const Eigen::Vector3d turn = (bones.affine[k] * arm).cross(push);
-      const Eigen::Vector3d stretch = (posture.rotations[k].transpose() * push).cwiseProduct(arm);
-      for (int c = 0; c < 3; ++c) {
-        add(9 * at.bone + c, turn[c]);
-        add(9 * at.bone + 3 + c, push[c]);
-        add(9 * at.bone + 6 + c, stretch[c]);
-      }
+      const Quaternion<double>& q = dual->real[k];
+      const Vec3 joint = rig.joint(at.bone), far = posture.rotations[k] * joint;
+      const Vec3 shift = joint + posture.translations[k] - far;
+      const double weight = at.weight * dual->sign(k, heavy);
+      const Vec3 push = 0.5 * weight * pulled(of_dual, q);
+      Quaternion<double> through; // (0, shift)ᵀ of_dual
+      through[0] = shift.dot(of_dual.tail<3>());
+      through.tail<3>() = -of_dual[0] * shift + of_dual.tail<3>().cross(shift);
+      const Vec3 turn =
+          weight * (0.5 * pulled(of_real, q) + 0.25 * pulled(through, q)) - far.cross(push);
+      add_bone(at.bone, turn, push, at.weight * back.cwiseProduct(x - joint), add);
     }
-    const Eigen::Vector3d pull = gradient[static_cast<std::size_t>(i)].transpose() * d;
-    for (const ShapeOffset& shape_of : rig.shapes_at(i))
-      add(9 * rig.bones() + shape_of.shape, pull.dot(shape_of.offset));
+  }
+
+  static Eigen::Matrix3d turn_of_blend(const DualBones<double>::Blend& b) {
+    return Eigen::Quaterniond(b.real[0], b.real[1], b.real[2], b.real[3])
+        .normalized()
+        .toRotationMatrix();
+  }
+
+  Eigen::Matrix3d dual_gradient(int i) const {
+    Vec3 scale = Vec3::Zero();
+    for (const BoneWeight& at : rig.bones_at(i))
+      scale += at.weight * posture.scales[static_cast<std::size_t>(at.bone)];
+    return turn_of_blend(dual->blend(rig, i)) * scale.asDiagonal();
   }
 };
 
