@@ -15,6 +15,7 @@ from ._study_methods import rest_methods
 from ._study_pdms import pdms_beam
 from ._study_shear import inverse_shear
 from ._study_tetrahedron import single_tetrahedron
+from ._study_torso import torso
 
 
 def _hanging_dome(run: Run) -> None:
@@ -54,17 +55,18 @@ _STUDIES: dict[str, Callable[..., None]] = {
     "rest-methods": rest_methods,
     "sagging-block": sagging_block,
     "single-tetrahedron": single_tetrahedron,
+    "torso": torso,
 }
 
 
 @command
 @click.argument("name", type=click.Choice(list(_STUDIES)))
-@click.option("--samples", type=int, help="How many (sagging-block: 2000).")
+@click.option("--samples", type=int, help="How many (sagging-block: 2000, torso: 3).")
 @click.option("--seed", type=int, help="Of what is drawn at random (default 1).")
 @click.option("--jobs", type=int, help="Processes; 0 (default): one a processor.")
 @click.option("--resume", is_flag=True, help="Go on with the samples that --out holds.")
 @click.option("--data", type=click.Path(path_type=Path, file_okay=False, exists=True),
-              help="Folder of beam_pdms/Beam2k.msh and liver_sofa/liver.msh.")  # fmt: skip
+              help="Folder of beam_pdms, liver_sofa, template_makehuman.")  # fmt: skip
 @click.option("--convergence", is_flag=True, help="Finer and finer meshes in place of samples.")
 def study(run: Run, name: str, **options: Any) -> None:
     r"""Run a study; writes its table and figure to --out (default: out/ and its name).
@@ -89,6 +91,9 @@ def study(run: Run, name: str, **options: Any) -> None:
     single-tetrahedron
                   153 loaded tetrahedra taken back by one inverse solve and by Sellier's
                   method; exits with 3 if the inverse fails or misses by 1e-12 m (--seed)
+    torso         errors of a torso registered to synthetic scans, over the number of landmarks
+                  given and of blendshapes, and over each weight of the energy (--samples: bodies
+                  a pose, 3; --data: template_makehuman, to register across templates)
     """
     given = {
         key: value for key, value in options.items() if value is not None and value is not False

@@ -1,0 +1,185 @@
+"""How sure a fit is: the covariance of its unknowns, and what that means at each vertex.
+
+The fit counts each patch of the scan as one observation with a standard deviation assumed
+beforehand. What its residuals really were, and over what distance neighbours share them, is
+measured afterwards and corrects that: `inflation`. The prior is left as it is, so that skin which
+the scan lacks is as uncertain as bodies differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from supple.errors import InputError
+from supple.registration.posture import Posture
+from supple.registration.template import Floats, OnSurface, Template
+
+#: Residuals are compared over distances up to this, m, in rings as wide as that.
+_FAR, _RING = 0.12, 0.01
+#: Points whose residuals are compared with all others'.
+_ANCHORS = 400
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Bands:
+    """How far points may be from where the fit puts them.
+
+    Attributes:
+        covariances: (n, 3, 3) m² of each point.
+        sd: (n,) m, root mean square over the three axes.
+        radius95: (n,) m, of the ball about each point that holds it in 95 of 100 cases.
+    """
+
+    covariances: Floats
+    sd: Floats
+    radius95: Floats
+
+
+def covariance(data_matrix: Floats, prior_matrix: Floats, inflation: float = 1.0) -> Floats:
+    """Of the unknowns (p, p): inverse of the energy's second derivative at the fit.
+
+    Args:
+        data_matrix: (p, p) of the data, in units of their assumed variance.
+        prior_matrix: (p, p) of all other terms.
+        inflation: what the data's variance is, in units of the assumed one.
+
+    Raises:
+        InputError: the matrices differ in size, or neither data nor prior bounds an unknown.
+    """
+    if data_matrix.shape != prior_matrix.shape:
+        raise InputError(
+            f"data_matrix and prior_matrix must be of one size, got {data_matrix.shape} and "
+            f"{prior_matrix.shape}."
+        )
+    whole = data_matrix / inflation + prior_matrix
+    scale = 1 / np.sqrt(np.maximum(np.diagonal(whole), 1e-300))
+    try:
+        root = np.linalg.inv(np.linalg.cholesky(whole * scale[:, None] * scale))
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "the data and the prior leave an unknown free; give the posture a prior."
+        ) from None
+    return np.asarray((root.T @ root) * scale[:, None] * scale)
+
+
+def inflation(points: Floats, residuals: Floats, patch: float, assumed: float,
+              share_free: float = 1.0) -> float:  # fmt: skip
+    """What a patch's variance is, in units of the assumed one.
+
+    A smooth movement of the skin is known from an area A to S / A, where S = ∫ C(|d|) dd² and C is
+    the covariance of residuals at a distance. The fit took it to be assumed² patch² / A.
+
+    Args:
+        points: (c, 3) m where the scan was used.
+        residuals: (c,) m signed distances from the registered skin there.
+        patch: m, side of a patch, one observation.
+        assumed: m, standard deviation that the fit gave to it.
+        share_free: of the observations that the unknowns leave free, by which residuals of a fit
+            are too small: 1 − tr(H⁻¹ H_data) / observations.
+
+    Source: Vanmarcke (1983), Random Fields, ch. 5, scale of fluctuation, here in the plane.
+    """
+    if len(points) < 10:
+        return 1.0
+    found = correlated(points, residuals)
+    whole = float(found.areas @ found.covariance) + found.own_area * found.variance
+    return max(whole, 1e-12) / (patch**2 * assumed**2) / max(share_free, 0.05)
+
+
+@dataclass(frozen=True)
+class Correlogram:
+    """Covariance of residuals by distance: (k,) m, (k,) m², area of each ring (k,) m²."""
+
+    distance: Floats
+    covariance: Floats
+    areas: Floats
+    variance: float
+    own_area: float  #: m² that a point stands for
+
+
+def correlated(points: Floats, residuals: Floats) -> Correlogram:
+    """Up to the first ring in which residuals no longer agree, at most 12 cm."""
+    anchors = np.unique(np.linspace(0, len(points) - 1, _ANCHORS).astype(np.int64))
+    apart = _distances(points[anchors], points)
+    rings = round(_FAR / _RING)
+    ring = np.minimum((apart / _RING).astype(np.int64), rings)
+    ring[np.arange(len(anchors)), anchors] = rings  # a point is no neighbour of itself
+    products = residuals[anchors, None] * residuals
+    count = np.bincount(ring.ravel(), minlength=rings + 1)[:rings]
+    sums = np.bincount(ring.ravel(), products.ravel(), minlength=rings + 1)[:rings]
+    mean: Floats = (sums / np.maximum(count, 1)).astype(np.float64)
+    edges = _RING * np.arange(rings + 1)
+    areas: Floats = np.pi * np.diff(edges**2)
+    per_area = count[1:6].sum() / len(anchors) / areas[1:6].sum()  # points a m² of skin
+    own = 1 / max(per_area, 1.0)
+    areas[0] = max(areas[0] - own, 0.0)
+    until = int(np.argmax(np.append(mean, -1.0) <= 0))
+    middles: Floats = _RING * (0.5 + np.arange(until, dtype=np.float64))
+    return Correlogram(middles, mean[:until], areas[:until],
+                       float(np.mean(residuals**2)), own)  # fmt: skip
+
+
+def vertex_uncertainty(template: Template, posture: Posture, covariance: Floats) -> Bands:
+    """Bands of the vertices (n,), to first order in the unknowns' ``covariance`` (9K+A, 9K+A)."""
+    return _bands(jacobian(template, posture), covariance)
+
+
+def uncertainty_at(
+    template: Template, posture: Posture, covariance: Floats, part: OnSurface
+) -> Bands:
+    """Bands of points on the skin: landmarks, curves."""
+    corners = template.triangles[part.triangle]
+    rows = jacobian(template, posture, np.unique(corners))
+    place = np.searchsorted(np.unique(corners), corners)
+    return _bands(np.einsum("kc,kcdp->kdp", part.barycentric, rows[place]), covariance)
+
+
+def jacobian(
+    template: Template, posture: Posture, of: npt.NDArray[np.int64] | None = None
+) -> Floats:
+    """Derivative (n, 3, 9K+A) of vertices by the unknowns of `Posture.stepped`, eqs. 23–25."""
+    rows = np.arange(len(template.points)) if of is None else of
+    weights, shapes = template.weights[rows], template.blendshapes[:, rows]
+    shape = template.points[rows] + np.tensordot(posture.blend, shapes, axes=1)
+    affine = posture.rotations * posture.scales[:, None, :]
+    local = shape[:, None] - template.joints
+    moved = np.einsum("kij,nkj->nki", affine, local)
+    by_bone = np.zeros((len(rows), 3, len(template.bones), 9))
+    for axis in range(3):
+        unit = np.eye(3)[axis]
+        by_bone[..., axis] = np.swapaxes(np.cross(unit, moved) * weights[..., None], 1, 2)
+        by_bone[:, axis, :, 3 + axis] = weights
+        turned = posture.rotations[:, :, axis]
+        by_bone[..., 6 + axis] = np.einsum("ki,nk,nk->nik", turned, local[..., axis], weights)
+    of_vertices = np.tensordot(weights, affine, axes=1)
+    by_shape = np.einsum("nij,anj->nia", of_vertices, shapes, optimize=True)
+    return np.concatenate([by_bone.reshape(len(rows), 3, -1), by_shape], axis=2)
+
+
+def _bands(rows: Floats, covariance: Floats) -> Bands:
+    """Bands of points whose derivatives are ``rows`` (n, 3, p)."""
+    spread = (rows.reshape(-1, rows.shape[2]) @ covariance).reshape(rows.shape)
+    matrices = np.matmul(spread, np.swapaxes(rows, 1, 2))
+    variances = np.maximum(np.linalg.eigvalsh(matrices), 0.0)
+    return Bands(matrices, np.sqrt(variances.mean(axis=1)), radius(variances, 0.95))
+
+
+def radius(variances: Floats, share: float) -> Floats:
+    """Radius (n,) of the ball that holds a normal point of ``variances`` (n, 3) in ``share``.
+
+    Σ λ_i z_i² is taken as a multiple of χ² with the same mean and variance: within 2 % at 95 %.
+    Source: Satterthwaite (1946), Biometrics Bulletin 2(6).
+    """
+    from scipy.special import gammaincinv
+
+    total, squares = variances.sum(axis=1), (variances**2).sum(axis=1)
+    freedom = np.divide(total**2, squares, out=np.full_like(total, 3.0), where=squares > 0)
+    return np.asarray(np.sqrt(2 * gammaincinv(freedom / 2, share) * total / freedom))
+
+
+def _distances(a: Floats, b: Floats) -> Floats:
+    squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))

@@ -1,0 +1,56 @@
+"""Errors of registered torsos over what was varied, a panel each sweep, as SVG and PNG."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .output import save
+
+#: Axis of each sweep; the others are factors of a weight.
+_AXES = {"landmarks": "landmarks given", "blendshapes": "blendshapes of the template"}
+_SYMBOLS = {"data": "λ data", "scale": "λ$_s$ scale", "blendshape": "λ$_b$ blendshape",
+            "joint": "λ$_j$ joint", "landmark": "λ$_l$ landmark"}  # fmt: skip
+_COLOURS = {"standing": "tab:blue", "supine": "tab:orange", "arms_up": "tab:green",
+            "tilted": "tab:red"}  # fmt: skip
+_ERRORS = (("surface_mm", "surface, mm"), ("landmark_mm", "landmarks, mm"))
+
+
+def draw(rows: Sequence[dict[str, Any]], path: Path) -> Path:
+    """Columns: sweeps; rows: surface and landmark error; ``path`` ends in .svg or .png."""
+    from matplotlib.figure import Figure
+
+    sweeps = list(dict.fromkeys(row["sweep"] for row in rows))
+    figure = Figure(figsize=(max(5.5, 3.2 * len(sweeps)), 6.4), layout="constrained")
+    panels = figure.subplots(2, len(sweeps), squeeze=False, sharey="row", sharex="col")
+    for column, sweep in enumerate(sweeps):
+        own = [row for row in rows if row["sweep"] == sweep]
+        for axes, (error, _) in zip(panels[:, column], _ERRORS, strict=True):
+            _panel(axes, own, error)
+        panels[-1, column].set_xlabel(_AXES.get(sweep, f"factor of {_SYMBOLS.get(sweep, sweep)}"))
+    for axes, (_, label) in zip(panels[:, 0], _ERRORS, strict=True):
+        axes.set_ylabel(label)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    return save(figure, path)
+
+
+def _panel(axes: Any, rows: Sequence[dict[str, Any]], error: str) -> None:
+    """Mean over cases by pose, from the least to the largest shaded, failures as crosses."""
+    for pose in dict.fromkeys(row["pose"] for row in rows):
+        own = [row for row in rows if row["pose"] == pose]
+        at = sorted({row["at"] for row in own})
+        values = [np.array([row[error] for row in own if row["at"] == x]) for x in at]
+        colour = _COLOURS.get(pose, "tab:grey")
+        axes.plot(at, [v.mean() for v in values], "o-", ms=4, color=colour, label=f"{pose}, mean")
+        axes.fill_between(at, [v.min() for v in values], [v.max() for v in values],
+                          color=colour, alpha=0.15, lw=0)  # fmt: skip
+        bad = [row for row in own if row["failed"]]
+        axes.plot([row["at"] for row in bad], [row[error] for row in bad], "x", color=colour, ms=6)
+    if rows and rows[0]["sweep"] not in _AXES:
+        axes.set_xscale("log")
+    axes.set_ylim(bottom=0)
+    axes.grid(True, alpha=0.25)
