@@ -30,7 +30,7 @@ class Skin:
 
 
 def skin(spacing: float) -> Skin:
-    """The cut torso with edges near ``spacing`` m on the back and finer ones on the breasts."""
+    """The cut torso, edges at most ``spacing`` m, finer on the breasts, a vertex on each nipple."""
     if not 0.004 <= spacing <= 0.04:
         raise InputError(f"spacing must be 0.004 to 0.04 m, got {spacing}.")
     points, triangles = _marched()
@@ -38,7 +38,10 @@ def skin(spacing: float) -> Skin:
         points, triangles = _clipped(points, triangles, height(points), normal)
     points = settled(points)
     points, triangles = _remeshed(points, triangles, spacing)
-    return _both_halves(settled(points), triangles)
+    points = settled(points)
+    tip = body.nipple()
+    points[np.linalg.norm(points - tip, axis=1).argmin()] = tip
+    return _both_halves(points, triangles)
 
 
 def sizes(points: Floats, spacing: float) -> Floats:
