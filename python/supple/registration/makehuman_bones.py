@@ -72,3 +72,13 @@ def bones(base: BaseMesh, points: Floats, breast: Floats) -> tuple[Bone, ...]:
         side = {"left": x, "right": -x}.get(name.rpartition("_")[2], 0.0)
         result.append(Bone(name, parent, (float(side), float(y), float(z))))
     return tuple(result)
+
+
+def moves(points: Floats, weights: Floats, bones: tuple[Bone, ...]) -> Floats:
+    """What each bone does to the skin (9 K, n, 3) m: shifts, turns and scales, to first order."""
+    result = []
+    for k, bone in enumerate(bones):
+        arm, share = points - bone.joint, weights[:, k, None]
+        for axis in np.eye(3):
+            result += [share * axis, share * np.cross(axis, arm), share * arm * axis]
+    return np.array(result)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.registration import procedural_marks as marks
+from supple.registration.procedural_marks import marks, regions
 from supple.registration.procedural_mesh import skin
 from supple.registration.procedural_rig import bones, weights
 from supple.registration.procedural_shapes import BOUND, blendshapes
 from supple.registration.template import Template
 
 
-def torso(spacing: float = 0.025) -> Template:
+def torso(spacing: float = 0.024) -> Template:
     """A woman's torso from the hips to the neck, with upper arms; upright, arms a little away.
 
     Everything but the triangles is a closed form of the place, so that another ``spacing``
@@ -19,13 +19,14 @@ def torso(spacing: float = 0.025) -> Template:
 
     Args:
         spacing: edges of the triangles on the back, 0.004 to 0.04 m; those on the breasts are
-            half as long. 0.025 gives 2,200 vertices.
+            half as long. 0.024 gives 2,200 vertices.
 
     Raises:
         InputError: another spacing.
     """
     made = skin(spacing)
-    shapes, names = blendshapes(made.points)
+    landmarks, curves = marks(made)
+    shapes, names = blendshapes(made)
     return Template(
         points=made.points,
         triangles=made.triangles,
@@ -34,9 +35,9 @@ def torso(spacing: float = 0.025) -> Template:
         blendshapes=shapes,
         blendshape_names=names,
         blendshape_bounds=np.tile([-BOUND, BOUND], (len(names), 1)),
-        landmarks=marks.landmarks(made),
-        curves=marks.curves(made),
-        regions=marks.regions(made.points),
+        landmarks=landmarks,
+        curves=curves,
+        regions=regions(made.points),
         mirror=made.mirror,
         name="procedural torso",
         source="Supple; made by code after published anthropometry.",

@@ -7,24 +7,29 @@ Plast. Reconstr. Surg. 100, 468–479. The height z = 0 is that of the nipples.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Floats = npt.NDArray[np.float64]
 
 #: Trunk: height, half breadth, front, back (m), exponent of the superellipse.
 _TRUNK = np.array([
-    (-0.40, 0.186, -0.096, 0.128, 2.3),
-    (-0.31, 0.177, -0.108, 0.116, 2.3),
-    (-0.23, 0.158, -0.114, 0.090, 2.35),
-    (-0.15, 0.136, -0.106, 0.077, 2.4),
-    (-0.08, 0.136, -0.103, 0.084, 2.45),
-    (0.00, 0.146, -0.098, 0.100, 2.5),
-    (0.07, 0.144, -0.084, 0.110, 2.5),
-    (0.12, 0.126, -0.064, 0.110, 2.4),
-    (0.16, 0.096, -0.042, 0.100, 2.2),
+    (-0.40, 0.188, -0.104, 0.132, 2.3),
+    (-0.31, 0.179, -0.117, 0.116, 2.3),
+    (-0.23, 0.160, -0.122, 0.090, 2.3),
+    (-0.15, 0.138, -0.115, 0.078, 2.35),
+    (-0.08, 0.137, -0.109, 0.084, 2.4),
+    (0.00, 0.144, -0.101, 0.098, 2.45),
+    (0.07, 0.141, -0.083, 0.105, 2.45),
+    (0.12, 0.124, -0.062, 0.105, 2.4),
+    (0.16, 0.096, -0.042, 0.098, 2.2),
     (0.20, 0.060, -0.018, 0.088, 2.0),
     (0.26, 0.040, -0.010, 0.070, 2.0),
 ])  # fmt: skip
@@ -40,7 +45,7 @@ BREAST_AXES = np.array([
     (0.0, 0.0, 1.0),
     (np.sin(_OUT), -np.cos(_OUT), 0.0),
 ])  #: rows: to the side, up, to the front of the left breast  # fmt: skip
-NIPPLE = np.array([0.008, 0.0, 0.0558])  #: in the breast's axes, m
+NIPPLE = np.array([0.008, -0.006, 0.0550])  #: in the breast's axes, m
 
 
 def level(points: Floats) -> Floats:
@@ -65,6 +70,17 @@ def normals(points: Floats) -> Floats:
     return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
 
 
+def met(start: Floats, way: Floats, surface: Callable[[Floats], Floats] | None = None) -> Floats:
+    """Where rays from ``start`` (n, 3) m outside along unit ``way`` meet the skin first, (n, 3) m.
+
+    By sphere tracing, for the level set's slope is near 1.
+    """
+    at = start.copy()
+    for _ in range(40):
+        at += 0.8 * (surface or level)(at)[:, None] * way
+    return at
+
+
 def smooth_min(a: Floats, b: Floats, width: Floats | float) -> Floats:
     """The lesser of both, twice differentiable where they are within ``width`` of each other."""
     near = np.maximum(width - np.abs(a - b), 0.0) / width
@@ -75,19 +91,20 @@ def trunk(p: Floats) -> Floats:
     """Superelliptic cross sections along the height, with the furrows of spine and sternum."""
     breadth, front, back, power = _profile()(np.clip(p[:, 2], *_TRUNK[[0, -1], 0])).T
     depth, y = (back - front) / 2, p[:, 1] - (back + front) / 2
-    radius = ((np.abs(p[:, 0]) / breadth) ** power + np.abs(y / depth) ** power + 1e-12) ** (1 / power)
-    return (radius - 1) * np.minimum(breadth, depth) + _furrows(p)
+    power_sum = (np.abs(p[:, 0]) / breadth) ** power + np.abs(y / depth) ** power + 1e-12
+    outside = power_sum ** (1 / power) - 1
+    return np.asarray(outside * np.minimum(breadth, depth) + _furrows(p))
 
 
 def _furrows(p: Floats) -> Floats:
     behind = 1 / (1 + np.exp(-(p[:, 1] - 0.02) / 0.015))
-    spine = 0.007 * np.exp(-((p[:, 0] / 0.022) ** 2)) * np.exp(-(((p[:, 2] + 0.07) / 0.15) ** 4))
+    spine = 0.009 * np.exp(-((p[:, 0] / 0.022) ** 2)) * np.exp(-(((p[:, 2] + 0.07) / 0.15) ** 4))
     sternum = 0.004 * np.exp(-((p[:, 0] / 0.03) ** 2)) * np.exp(-(((p[:, 2] - 0.03) / 0.09) ** 4))
     return np.asarray(spine * behind + sternum * (1 - behind))
 
 
 @cache
-def _profile():
+def _profile() -> CubicSpline:
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(_TRUNK[:, 0], _TRUNK[:, 1:])
@@ -96,7 +113,7 @@ def _profile():
 def shoulder_girdle(p: Floats) -> Floats:
     """From the neck's base over the clavicle and the trapezius to the acromion."""
     collar = cone(p, (0.020, 0.030, 0.132), (0.150, 0.028, 0.116), 0.046, 0.042)
-    slope = cone(p, (0.010, 0.052, 0.222), (0.140, 0.042, 0.126), 0.030, 0.034)
+    slope = cone(p, (0.010, 0.052, 0.222), (0.150, 0.040, 0.124), 0.030, 0.033)
     return smooth_min(collar, slope, 0.04)
 
 
@@ -108,7 +125,7 @@ def neck(p: Floats) -> Floats:
 def arm(p: Floats) -> Floats:
     """Deltoid and upper arm, |x| taken."""
     upper = cone(p, tuple(SHOULDER), tuple(SHOULDER + 0.30 * ARM), 0.048, 0.041)
-    deltoid = ellipsoid(p - (SHOULDER + 0.035 * ARM), (0.050, 0.054, 0.080))
+    deltoid = ellipsoid(p - (SHOULDER + 0.040 * ARM), (0.048, 0.053, 0.086))
     return smooth_min(upper, deltoid, 0.03)
 
 
@@ -118,13 +135,19 @@ def breast(p: Floats) -> tuple[Floats, Floats]:
     The lower fold is sharp; above, the breast fades into the chest.
     """
     q = (p - BREAST) @ BREAST_AXES.T
-    pole = ellipsoid(q - (0.002, -0.006, 0.0), (0.061, 0.058, 0.051))
-    slope = ellipsoid(q - (-0.002, 0.030, -0.026), (0.058, 0.085, 0.050))
+    pole = ellipsoid(q - (0.003, -0.011, 0.0), (0.060, 0.056, 0.051))
+    slope = ellipsoid(q - (-0.002, 0.026, -0.030), (0.058, 0.080, 0.046))
     mound = smooth_min(pole, slope, 0.05)
     areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
-    nipple = np.linalg.norm(q - NIPPLE, axis=1) - 0.0055
-    softness = 0.016 + 0.05 / (1 + np.exp(-(q[:, 1] - 0.025) / 0.018))
+    nipple = np.linalg.norm(q - NIPPLE + (0.0, 0.0, 0.003), axis=1) - 0.0055
+    softness = 0.021 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
     return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
+
+
+def nipple() -> Floats:
+    """The tip (3,) m of the left one."""
+    before = NIPPLE * (1.0, 1.0, 0.0) + (0.0, 0.0, 0.1)
+    return np.asarray(met((BREAST + before @ BREAST_AXES)[None], -BREAST_AXES[2])[0])
 
 
 def cone(p: Floats, a: tuple[float, ...], b: tuple[float, ...], ra: float, rb: float) -> Floats:

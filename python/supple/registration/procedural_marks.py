@@ -2,59 +2,57 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import numpy.typing as npt
 
 from supple.registration import procedural_body as body
 from supple.registration.procedural_mesh import Skin
 from supple.registration.procedural_rig import BASE, BASE_RADII, arm_part, breast_radius, left
-from supple.registration.template import OnSurface
+from supple.registration.template import CURVES, LANDMARKS, OnSurface
 from supple.surface import Surface
 
 Floats = npt.NDArray[np.float64]
 
-NOTCH, XIPHOID = 0.142, -0.030  #: heights of the ends of the sternum, m
+NOTCH, XIPHOID = 0.140, -0.030  #: heights of the ends of the sternum, m
 AXILLA = np.array([0.152, -0.012, 0.056])  #: near the left one, m
+_MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
+_MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
 
 
-def landmarks(skin: Skin) -> dict[str, OnSurface]:
-    """The twelve."""
-    places = {"nipple": body.NIPPLE[None, :2], "breast_medial": _outline(np.array([np.pi])),
-              "breast_lateral": _outline(np.array([0.0])),
-              "breast_inferior": _outline(np.array([-np.pi / 2]))}  # fmt: skip
-    at = {name: _on_breast(place) for name, place in places.items()}
-    at["axilla"] = AXILLA[None]
-    found = {"sternal_notch": _drawn(skin, _midline(np.array([NOTCH]))),
-             "xiphoid": _drawn(skin, _midline(np.array([XIPHOID])))}  # fmt: skip
-    for name, points in at.items():
-        found[f"{name}_left"] = _drawn(skin, points)
-        found[f"{name}_right"] = mirrored(skin, found[f"{name}_left"])
-    return found
-
-
-def curves(skin: Skin, count: int = 48) -> dict[str, OnSurface]:
-    """Two arrows that meet on the sternum, and the outlines of the breasts, medial point first."""
-    middle = (NOTCH + XIPHOID) / 2
-    outline = _outline(np.pi + np.linspace(0, 2 * np.pi, count, endpoint=False))
-    breast = _drawn(skin, _on_breast(outline), closed=True)
-    return {"sternum_arrow_upper": _drawn(skin, _arrow(NOTCH - 0.004, middle + 0.010)),
-            "sternum_arrow_lower": _drawn(skin, _arrow(XIPHOID + 0.004, middle - 0.010)),
-            "breast_left": breast, "breast_right": mirrored(skin, breast)}  # fmt: skip
+def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
+    """Landmarks and curves on the triangles of ``skin``; those on the right are mirror images."""
+    found = {name: _on_midline(skin, np.array([z])) for name, z in _MIDDLE.items()}
+    found |= {"sternum_arrow_upper": _arrow(skin, NOTCH - 0.004, _MEET + 0.010),
+              "sternum_arrow_lower": _arrow(skin, XIPHOID + 0.004, _MEET - 0.010)}  # fmt: skip
+    for name, points in _left_places().items():
+        found[name] = _nearest(skin, points, closed=name == "breast_left")
+        found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
+    return {name: found[name] for name in LANDMARKS}, {name: found[name] for name in CURVES}
 
 
 def regions(points: Floats) -> dict[str, npt.NDArray[np.bool_]]:
-    """Masks (n,) of the parts of the skin."""
+    """Masks (n,) of the parts of the skin at ``points`` (n, 3) m."""
     p = left(points)
     n = body.normals(points)
     arm, breast = arm_part(p) > 0.5, breast_radius(p) < 1
     neck = ((p - body.NECK) @ body.NECK_AXIS > 0.025) & ~arm
-    front = (n[:, 1] < 0) & ~arm & ~neck
+    trunk = ~arm & ~neck
+    front = (n[:, 1] < 0) & trunk
     on_left, on_right = points[:, 0] > 0, points[:, 0] < 0
     sternum = front & (p[:, 0] < 0.025) & (p[:, 2] < NOTCH) & (p[:, 2] > XIPHOID)
-    return {"breast_left": breast & front & on_left, "breast_right": breast & front & on_right,
-            "sternum": sternum, "back": (n[:, 1] > 0.25) & (p[:, 1] > 0.02) & ~arm & ~neck,
-            "abdomen": front & (p[:, 2] < -0.09), "neck": neck,
-            "arm_left": arm & on_left, "arm_right": arm & on_right}  # fmt: skip
+    back = (n[:, 1] > 0.25) & (p[:, 1] > 0.02) & trunk
+    return {
+        "breast_left": breast & trunk & on_left,
+        "breast_right": breast & trunk & on_right,
+        "sternum": sternum,
+        "back": back,
+        "abdomen": front & (p[:, 2] < -0.09),
+        "neck": neck,
+        "arm_left": arm & on_left,
+        "arm_right": arm & on_right,
+    }
 
 
 def mirrored(skin: Skin, part: OnSurface) -> OnSurface:
@@ -64,38 +62,54 @@ def mirrored(skin: Skin, part: OnSurface) -> OnSurface:
     return OnSurface(other, part.barycentric[:, [0, 2, 1]], part.closed)
 
 
-def _drawn(skin: Skin, points: Floats, closed: bool = False) -> OnSurface:
-    near = Surface(skin.points, skin.triangles).closest(points)
-    return OnSurface(np.asarray(near.triangle, dtype=np.int64), np.asarray(near.barycentric), closed)
+def _nearest(skin: Skin, points: Floats, closed: bool = False) -> OnSurface:
+    """The points of the left half closest to ``points`` (k, 3) m."""
+    half = Surface(skin.points, skin.triangles[: len(skin.triangles) // 2])
+    near = half.closest(points)
+    return OnSurface(
+        np.asarray(near.triangle, dtype=np.int64), np.asarray(near.barycentric), closed
+    )
 
 
-def _outline(angle: Floats) -> Floats:
-    """Places (k, 2) m on the base of the left breast, to the side and up, in its axes."""
-    return BASE + BASE_RADII * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+@cache
+def _left_places() -> dict[str, Floats]:
+    """Points (k, 3) m of the left: of each landmark and of the breast's outline."""
+    outline = np.pi + np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    on_base = BASE + BASE_RADII * np.stack([np.cos(outline), np.sin(outline)], axis=1)
+    start = body.BREAST + on_base @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
+    line = body.met(start, -body.BREAST_AXES[2])
+    return {
+        "nipple_left": body.nipple()[None],
+        "axilla_left": AXILLA[None],
+        "breast_medial_left": line[:1],
+        "breast_inferior_left": line[12:13],
+        "breast_lateral_left": line[24:25],
+        "breast_left": line,
+    }
 
 
-def _on_breast(place: Floats) -> Floats:
-    """Points (k, 3) m of the skin before places (k, 2) m in the left breast's axes."""
-    start = body.BREAST + place @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
-    return _shot(start, -body.BREAST_AXES[2])
+def _on_midline(skin: Skin, heights: Floats) -> OnSurface:
+    """Where the planes z = ``heights`` (k,) m cut the front's midline, on edges of the left."""
+    x, y, z = skin.points.T
+    left = skin.triangles[: len(skin.triangles) // 2]
+    triangle, corner = np.nonzero((x[left] == 0) & (x[np.roll(left, -1, axis=1)] == 0))
+    a, b = left[triangle, corner], left[triangle, (corner + 1) % 3]
+    cuts = (z[a] - heights[:, None]) * (z[b] - heights[:, None]) <= 0
+    edge = np.where(cuts, (y[a] + y[b]) / 2, np.inf).argmin(axis=1)
+    share = (heights - z[a[edge]]) / (z[b[edge]] - z[a[edge]])
+    barycentric = np.zeros((len(heights), 3))
+    rows = np.arange(len(heights))
+    barycentric[rows, corner[edge]] = 1 - share
+    barycentric[rows, (corner[edge] + 1) % 3] = share
+    return OnSurface(triangle[edge], barycentric)
 
 
-def _midline(height: Floats) -> Floats:
-    start = np.stack([0 * height, 0 * height - 0.2, height], axis=1)
-    return _shot(start, np.array([0.0, 1.0, 0.0]))
-
-
-def _arrow(start: float, tip: float) -> Floats:
-    """Shaft, tip, one barb, tip, other barb: points (k, 3) m before the skin of the midline."""
-    shaft = _midline(np.linspace(start, tip, 12))
-    back = _midline(np.array([tip + 0.012 * np.sign(start - tip)]))[0]
-    side = np.array([0.008, 0.0, 0.0])
-    return np.vstack([shaft, back + side, shaft[-1], back - side])
-
-
-def _shot(start: Floats, way: Floats) -> Floats:
-    """Where rays from outside first meet the skin: sphere tracing, the level set ≤ 1-Lipschitz."""
-    at = start.copy()
-    for _ in range(60):
-        at += 0.7 * body.level(at)[:, None] * way
-    return at
+def _arrow(skin: Skin, start: float, tip: float) -> OnSurface:
+    """On the midline from ``start`` to ``tip`` (heights, m), left barb, tip, right barb."""
+    shaft = _on_midline(skin, np.linspace(start, tip, 12))
+    back = _on_midline(skin, np.array([tip + 0.012 * np.sign(start - tip)]))
+    barb = _nearest(skin, back.at(skin.points, skin.triangles) + np.array([0.008, 0.0, 0.0]))
+    end = OnSurface(shaft.triangle[-1:], shaft.barycentric[-1:])
+    parts = (shaft, barb, end, mirrored(skin, barb))
+    return OnSurface(np.concatenate([part.triangle for part in parts]),
+                     np.vstack([part.barycentric for part in parts]))  # fmt: skip

@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration import procedural_body as body
-from supple.registration.procedural_bumps import bumps
 from supple.registration.procedural_breast_shapes import BREAST_SHAPES
+from supple.registration.procedural_bumps import bumps
+from supple.registration.procedural_mesh import Skin
 from supple.registration.procedural_trunk_shapes import TRUNK_SHAPES
 
 Floats = npt.NDArray[np.float64]
@@ -16,19 +17,18 @@ Floats = npt.NDArray[np.float64]
 BOUND = 4.0
 
 
-def blendshapes(points: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Displacements (A, n, 3) m of the skin at ``points`` (n, 3) m for a coefficient 1; names."""
-    flip = np.array([-1.0, 1.0, 1.0])
-    here, there = (points, body.normals(points)), (points * flip, body.normals(points) * flip)
+def blendshapes(skin: Skin) -> tuple[Floats, tuple[str, ...]]:
+    """Displacements (A, n, 3) m of the skin's vertices for a coefficient of 1, and their names."""
+    normals = body.normals(skin.points)
     fields: list[Floats] = []
     names: list[str] = []
-    for table in (BREAST_SHAPES, {**TRUNK_SHAPES, **bumps()}):
-        for name, field in table.items():
-            left, right = field(*here), field(*there) * flip
-            if name.endswith("_left"):
-                fields += [left, right]
-                names += [name, name.removesuffix("_left") + "_right"]
-            else:
-                fields.append((left + right) / 2)
-                names.append(name)
+    for name, field in {**BREAST_SHAPES, **TRUNK_SHAPES, **bumps()}.items():
+        moved = field(skin.points, normals)
+        image = moved[skin.mirror] * (-1.0, 1.0, 1.0)
+        if name.endswith("_left"):
+            fields += [moved, image]
+            names += [name, name.removesuffix("_left") + "_right"]
+        else:
+            fields.append((moved + image) / 2)
+            names.append(name)
     return np.stack(fields), tuple(names)

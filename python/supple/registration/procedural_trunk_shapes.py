@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration import procedural_body as body
-from supple.registration.procedural_fields import Field, bump, shift, widened
+from supple.registration.procedural_fields import Field, band, bump, shift, trunk_bump, widened
 from supple.registration.procedural_rig import arm_part, smooth
 
 Floats = npt.NDArray[np.float64]
@@ -16,8 +16,8 @@ def _kyphosis(centre: float, half: float, by: float) -> Field:
     """A band of heights moved backwards by ``by`` m, arms and all."""
 
     def field(p: Floats, _: Floats) -> Floats:
-        w = np.maximum(1 - ((p[:, 2] - centre) / half) ** 2, 0.0) ** 3
-        return by * w[:, None] * np.array([0.0, 1.0, 0.0])
+        w = band(p[:, 2], centre, half)
+        return np.asarray(w[:, None] * np.array([0.0, by, 0.0]))
 
     return field
 
@@ -56,19 +56,19 @@ TRUNK_SHAPES: dict[str, Field] = {
     "waist_depth": widened(-0.16, 0.12, (0.0, 0.12)),
     "hip_breadth": widened(-0.30, 0.14, (0.09, 0.0)),
     "hip_depth": widened(-0.30, 0.14, (0.0, 0.12)),
-    "belly_upper": bump((0.0, -0.11, -0.12), (0.11, 0.10, 0.08), 0.014),
-    "belly_lower": bump((0.0, -0.11, -0.25), (0.13, 0.10, 0.09), 0.016),
+    "belly_upper": trunk_bump((0.0, -0.11, -0.12), (0.11, 0.10, 0.08), 0.014),
+    "belly_lower": trunk_bump((0.0, -0.11, -0.25), (0.13, 0.10, 0.09), 0.016),
     "belly_navel": bump((0.0, -0.115, -0.185), (0.05, 0.08, 0.05), -0.006),
-    "flank_left": bump((0.14, 0.0, -0.17), (0.09, 0.12, 0.08), 0.012),
-    "iliac_left": bump((0.16, 0.0, -0.27), (0.09, 0.12, 0.08), 0.012),
-    "back_roll_left": bump((0.10, 0.085, -0.07), (0.10, 0.09, 0.06), 0.009),
-    "buttock_left": bump((0.085, 0.11, -0.30), (0.09, 0.10, 0.08), 0.016),
-    "lumbar_hollow": bump((0.0, 0.085, -0.17), (0.10, 0.10, 0.09), -0.012),
-    "spine_furrow": bump((0.0, 0.09, -0.06), (0.035, 0.08, 0.20), -0.005),
+    "flank_left": trunk_bump((0.14, 0.0, -0.17), (0.09, 0.12, 0.08), 0.012),
+    "iliac_left": trunk_bump((0.16, 0.0, -0.27), (0.09, 0.12, 0.08), 0.012),
+    "back_roll_left": trunk_bump((0.10, 0.085, -0.07), (0.10, 0.09, 0.06), 0.009),
+    "buttock_left": trunk_bump((0.085, 0.11, -0.30), (0.09, 0.10, 0.08), 0.016),
+    "lumbar_hollow": trunk_bump((0.0, 0.085, -0.17), (0.10, 0.10, 0.09), -0.012),
+    "spine_furrow": trunk_bump((0.0, 0.09, -0.06), (0.035, 0.08, 0.20), -0.005),
     "kyphosis": _kyphosis(0.12, 0.14, 0.014),
     "lordosis": _kyphosis(-0.16, 0.13, -0.012),
-    "dorsi_left": bump((0.12, 0.07, 0.04), (0.07, 0.09, 0.09), 0.008),
-    "scapula_left": bump((0.085, 0.115, 0.075), (0.06, 0.08, 0.08), 0.008),
+    "dorsi_left": trunk_bump((0.12, 0.07, 0.04), (0.07, 0.09, 0.09), 0.008),
+    "scapula_left": trunk_bump((0.085, 0.115, 0.075), (0.06, 0.08, 0.08), 0.008),
     "shoulder_up_left": shift((0.17, 0.02, 0.14), (0.13, 0.16, 0.12), (0.0, 0.0, 0.014)),
     "shoulder_out_left": shift((0.17, 0.02, 0.13), (0.13, 0.16, 0.14), (0.012, 0.0, 0.0)),
     "shoulder_front_left": shift((0.17, 0.02, 0.13), (0.13, 0.16, 0.14), (0.0, -0.014, 0.0)),
@@ -80,18 +80,16 @@ TRUNK_SHAPES: dict[str, Field] = {
     "pectoral_left": bump((0.10, -0.055, 0.10), (0.07, 0.06, 0.06), 0.008),
     "axilla_front_left": bump((0.155, -0.035, 0.065), (0.045, 0.05, 0.05), 0.008),
     "axilla_back_left": bump((0.155, 0.06, 0.055), (0.05, 0.05, 0.06), 0.009),
-    "axilla_side_left": bump((0.15, 0.01, 0.02), (0.05, 0.07, 0.07), 0.008),
+    "axilla_side_left": trunk_bump((0.15, 0.01, 0.02), (0.05, 0.07, 0.07), 0.008),
     "arm_girth_left": _arm(0.0, 0.12, 0.12),
     "arm_ellipse_left": _arm(0.0, 0.10, -0.10),
     "arm_length_left": _arm(0.12, 0.0, 0.0),
     "neck_girth": _neck((0.10, 0.10, 0.0)),
     "neck_depth": _neck((-0.04, 0.10, 0.0)),
     "neck_length": _neck((0.0, 0.0, 0.15)),
-    "neck_forward": _neck((0.0, 0.0, 0.0)),
+    "neck_forward": shift((0.0, 0.03, 0.25), (0.10, 0.12, 0.12), (0.0, -0.012, 0.0)),
     "nape": bump((0.0, 0.09, 0.19), (0.07, 0.06, 0.07), 0.008),
     "sternum_hollow": bump((0.0, -0.08, 0.05), (0.04, 0.06, 0.11), -0.006),
     "throat": bump((0.0, -0.02, 0.165), (0.05, 0.05, 0.05), -0.006),
-    "ribs_left": bump((0.09, -0.09, -0.09), (0.07, 0.08, 0.05), 0.008),
+    "ribs_left": trunk_bump((0.09, -0.09, -0.09), (0.07, 0.08, 0.05), 0.008),
 }
-TRUNK_SHAPES.pop("neck_forward")
-TRUNK_SHAPES["neck_forward"] = shift((0.0, 0.03, 0.25), (0.10, 0.12, 0.12), (0.0, -0.012, 0.0))
