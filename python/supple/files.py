@@ -8,8 +8,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from supple.errors import InputError
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 #: Metres in one unit of length.
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
@@ -54,3 +58,22 @@ def _umask() -> int:
     mask = os.umask(0o022)
     os.umask(mask)
     return mask
+
+
+def parsed_xml(text: str | bytes, source: object) -> Element:
+    """The root of an XML text that declares no entities, so it neither loads nor inflates anything.
+
+    Raises:
+        InputError: no XML, or one that declares entities.
+    """
+    from xml.etree import ElementTree
+
+    data = text.encode() if isinstance(text, str) else text
+    if b"<!ENTITY" in data.replace(b"\x00", b""):
+        raise InputError(f"{source} declares XML entities, which no scan needs; export it again.")
+    try:
+        return ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        raise InputError(
+            f"{source} is no XML that can be read ({error}); export it again."
+        ) from None

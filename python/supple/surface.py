@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,11 +12,11 @@ import numpy.typing as npt
 from supple.errors import InputError, MeshError
 from supple.files import existing, metres, replacing
 from supple.mesh_checks import checked_ids, checked_points, some
+from supple.surface_files import load
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-_FORMATS = (".ply", ".stl", ".obj", ".off")
 #: Extents, in the file's numbers, that betray metres read as mm, and mm read as metres.
 _LIKE_METRES = (0.02, 3.0)
 _LIKE_MILLIMETRES = (20.0, 3000.0)
@@ -44,9 +40,9 @@ class Surface:
     def __post_init__(self) -> None:
         points = checked_points(self.points)
         triangles = checked_ids(self.triangles, 3, len(points), "triangles")
-        flat = np.flatnonzero(_flat(points, triangles))
-        if len(flat):
-            raise MeshError(f"triangles {some(flat)} have no area; remove them.")
+        none = np.flatnonzero(flat(points, triangles))
+        if len(none):
+            raise MeshError(f"triangles {some(none)} have no area; remove them.")
         for name, array in (("points", points), ("triangles", triangles)):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -66,12 +62,12 @@ class Surface:
         """
         file = Path(path)
         scale = metres(unit)
-        raw_points, raw_triangles = _load(existing(file))
+        raw_points, raw_triangles = load(existing(file))
         if not len(raw_points):
             raise MeshError(f"{file} holds no points; export the surface again.")
         points = checked_points(raw_points)
         triangles = checked_ids(raw_triangles, 3, len(points), "triangles")
-        triangles = triangles[~_flat(points, triangles)]
+        triangles = triangles[~flat(points, triangles)]
         if points_only:
             triangles = triangles[:0]
         elif not len(triangles):
@@ -152,44 +148,11 @@ def _cross(points: Floats, triangles: Ints) -> Floats:
     return np.cross(b - a, c - a)
 
 
-def _flat(points: Floats, triangles: Ints) -> npt.NDArray[np.bool_]:
+def flat(points: Floats, triangles: Ints) -> npt.NDArray[np.bool_]:
     """Which triangles (t,) have no area beyond the rounding of their edges."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     longest = np.maximum(((b - a) ** 2).sum(axis=1), ((c - a) ** 2).sum(axis=1))
     return np.asarray(np.linalg.norm(_cross(points, triangles), axis=1) <= 1e-12 * longest)
-
-
-def _load(path: Path) -> tuple[Floats, Ints]:
-    """Points and triangles of a file, as they stand in it."""
-    import trimesh
-
-    if path.suffix.lower() not in _FORMATS:
-        raise MeshError(f"{path} must be one of {', '.join(_FORMATS)}; save it as PLY.")
-    keep_ids: dict[str, Any] = {"maintain_order": True} if path.suffix.lower() == ".obj" else {}
-    said = io.StringIO()
-    try:
-        with redirect_stdout(said), redirect_stderr(said), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            loaded: Any = trimesh.load(path, process=False, **keep_ids)
-    except Exception as error:  # trimesh raises what its parsers happen to raise
-        raise MeshError(
-            f"{path} is no surface that can be read ({error}); save it as PLY."
-        ) from None
-    points, faces = _joined(loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded])
-    if path.suffix.lower() != ".stl":
-        return points, faces
-    points, same = np.unique(points, axis=0, return_inverse=True)  # STL repeats each corner
-    return points, same.ravel()[faces]
-
-
-def _joined(parts: Sequence[Any]) -> tuple[Floats, Ints]:
-    """Points and triangles of trimesh objects, of which some may be clouds."""
-    points, triangles = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
-    for part in parts:
-        faces = np.asarray(getattr(part, "faces", ()), dtype=np.int64).reshape(-1, 3)
-        triangles = np.vstack([triangles, faces + len(points)])
-        points = np.vstack([points, np.asarray(part.vertices, dtype=np.float64).reshape(-1, 3)])
-    return points, triangles
 
 
 def _ply(surface: Surface, scale: float, comments: tuple[str, ...]) -> tuple[bytes, bytes]:
