@@ -22,6 +22,7 @@ from supple.errors import InputError
 from supple.registration.body_prior import body_prior
 from supple.registration.initial_pose import Candidate, SearchSettings, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
+from supple.registration.offset import Offset, OffsetSettings, offset
 from supple.registration.posture import Posture
 from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
@@ -64,6 +65,7 @@ class RegisterSettings:
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
     doubts: Doubts = Doubts()
+    offset: OffsetSettings | None = OffsetSettings()  #: None: bones and shapes alone
 
 
 def register(
@@ -111,8 +113,10 @@ def register(
     first = tried[0].posture if tried else starts[0].posture
     stages = keep.fine if tried else keep.warm
     fit = _run(rig, first, stages, named, keep)
+    clock.stage("offset")
+    moved = _offset(rig, fit, keep)
     clock.stage("judge")
-    return _result(rig, scan, fit, tried, starts, keep, clock)
+    return _result(rig, scan, fit, moved, tried, starts, keep, clock)
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
@@ -197,15 +201,24 @@ def coarse_score(fit: RigFit, reach: float) -> float:
     return float(np.where(np.isfinite(fit.distance), fit.distance, reach).mean())
 
 
-def _result(rig: Rig, scan: Surface, fit: RigFit, tried: list[RigFit], starts: list[Candidate],
-            keep: RegisterSettings, clock: _Clock) -> Registration:  # fmt: skip
+def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
+    if keep.offset is None:
+        return Offset(np.zeros_like(fit.points), None, 0.0)
+    cloud = rig.cloud
+    return offset(
+        fit, rig.template.triangles, fit.scan_points, fit.scan_normals, cloud.oriented, keep.offset
+    )
+
+
+def _result(rig: Rig, scan: Surface, fit: RigFit, moved: Offset, tried: list[RigFit],
+            starts: list[Candidate], keep: RegisterSettings, clock: _Clock) -> Registration:  # fmt: skip
     covariance = fit.covariance()
     warnings = doubts(rig, fit, tried, starts, covariance, keep.doubts)
-    zero = np.zeros_like(fit.points)
     history = [value for one in [*tried[:1], fit] for value in one.history]
     return Registration(
-        rig.template, fit.posture, fit.points, scan, zero, covariance, zero[:, 0],
-        not warnings, warnings, clock.stop(), len(history), history, _reach(fit), fit,
+        rig.template, fit.posture, fit.points + moved.vectors, scan, moved.vectors,
+        moved.precision, covariance, not warnings, warnings, clock.stop(), len(history), history,
+        _reach(fit), fit,
     )  # fmt: skip
 
 
