@@ -15,6 +15,7 @@ the thorax (Göpper et al. 2020, doi 10.1371/journal.pone.0233586).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,9 @@ Ints = npt.NDArray[np.int64]
 #: Distance (m) from the outline of the skin that the chest wall continues: beyond the flank of
 #: the breast, not yet on the belly or the arm.
 AROUND = (12e-3, 45e-3)
+SIDES = ("left", "right")
+#: Least cosine of the angle between that skin and the outline's plane.
+_FACING = 0.3
 #: Of the thin plate: fewer points do not hold it, and how much of their noise it leaves out.
 _LEAST, _SMOOTHING = 12, 1e-4
 
@@ -72,17 +76,26 @@ def breast_patch(template: Template, side: str) -> BreastPatch:
         MeshError: the curve does not go once around that nipple.
     """
     cut = cut_along(template, f"breast_{side}", f"nipple_{side}")
+    support = around(template, cut, [side])
+    inner, wall = stretched(template, cut, support)
+    return BreastPatch(side, cut, support, wall, inner)
+
+
+def stretched(template: Template, cut: Cut, support: Ints) -> tuple[Ints, Floats]:
+    """Inner points (i,) of a cut, and weights (i, b + s) that put a wall behind them.
+
+    The weights are of the rim's points and of the ``support`` (s,), vertices of the template.
+    """
     at = cut.at(template.points)
     normal, centre = base_plane(at[cut.rim])
-    axes = _axes(normal)
-    support = _around(template, side, cut)
+    flatten = _axes(normal).T
     inner = np.setdiff1d(np.arange(len(at)), cut.rim)
     film = _soap_film(cut, inner)
-    rim = (at[cut.rim] - centre) @ axes.T
-    around = (template.points[support] - centre) @ axes.T
-    plate = _thin_plate(around, np.vstack([rim, film @ rim]))
+    rim = (at[cut.rim] - centre) @ flatten
+    held = (template.points[support] - centre) @ flatten
+    plate = _thin_plate(held, np.vstack([rim, film @ rim]))
     on_rim, behind = plate[: len(rim)], plate[len(rim) :]
-    return BreastPatch(side, cut, support, np.hstack([film, behind - film @ on_rim]), inner)
+    return inner, np.hstack([film, behind - film @ on_rim])
 
 
 def base_plane(rim: Floats) -> tuple[Floats, Floats]:
@@ -119,17 +132,22 @@ def _axes(normal: Floats) -> Floats:
     return np.stack([u, np.cross(normal, u)])
 
 
-def _around(template: Template, side: str, cut: Cut) -> Ints:
-    """Vertices beside the outline, of the trunk, that face as it does, outside of both breasts."""
-    near = (cut.distance > AROUND[0]) & (cut.distance < AROUND[1])
-    other = "left" if side == "right" else "right"
-    twin = cut_along(template, f"breast_{other}", f"nipple_{other}")
-    trunk = twin.distance > min(AROUND[0], 5e-3)
+def around(template: Template, cut: Cut, sides: Sequence[str] = SIDES) -> Ints:
+    """Vertices beside outlines, of the trunk, that face as the cut does, outside of both breasts.
+
+    Args:
+        sides: of the outlines; AROUND is the distance from them.
+    """
+    distance = {side: cut_along(template, f"breast_{side}", f"nipple_{side}").distance
+                for side in SIDES}  # fmt: skip
+    nearest = np.min([distance[side] for side in sides], axis=0)
+    chosen = (nearest > AROUND[0]) & (nearest < AROUND[1])
+    chosen &= np.min(list(distance.values()), axis=0) > AROUND[0] / 2
     for part in ("arm_left", "arm_right", "neck"):
-        trunk &= ~template.regions[part]
+        chosen &= ~template.regions[part]
     normal, _ = base_plane(cut.at(template.points)[cut.rim])
-    facing = vertex_normals(template.points, template.triangles) @ normal > 0.3
-    return np.flatnonzero(near & trunk & facing)
+    facing = vertex_normals(template.points, template.triangles) @ normal > _FACING
+    return np.flatnonzero(chosen & facing)
 
 
 def _soap_film(cut: Cut, inner: Ints) -> Floats:
