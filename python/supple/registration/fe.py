@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError, MeshError
-from supple.registration.breast_patch import SIDES, around, base_plane, stretched
+from supple.registration.breast_patch import SIDES, around, stretched
 from supple.registration.outline import Cut, cut_along, cut_at
+from supple.registration.skin import vertex_normals
 from supple.surface import Surface
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ Ints = npt.NDArray[np.int64]
 
 #: What a facet faces, in the order of `Front.part`; names of the mesh's tags.
 PARTS = ("skin", "chest", "cut")
+#: How often the normals are smoothed along which the chest wall is moved back.
+_SMOOTHED = 3
 
 
 @dataclass(frozen=True)
@@ -72,17 +75,16 @@ def front(registration: Registration, settings: FrontSettings) -> Front:
     """The same with its parts.
 
     The chest wall is that of `breast_patch`, here of both breasts and what is between them, moved
-    back by ``depth``; a strip joins it to the rim of the skin.
+    back by ``depth`` along its normals; a strip joins it to the rim of the skin.
     """
     template, vertices = registration.template, registration.points
     cut = _cut(template, settings.margin)
     support = around(template, cut)
     inner, weights = stretched(template, cut, support)
     skin = cut.at(vertices)
-    normal, _ = base_plane(skin[cut.rim])
     wall = skin.copy()
     wall[inner] = weights @ np.vstack([skin[cut.rim], vertices[support]])
-    wall = wall - settings.depth * normal
+    wall = wall - settings.depth * vertex_normals(wall, cut.triangles, _SMOOTHED)
     q, next_ = len(skin), np.roll(cut.rim, -1)
     strip = np.vstack([np.stack([cut.rim, q + cut.rim, next_], axis=1),
                        np.stack([next_, q + cut.rim, q + next_], axis=1)])  # fmt: skip
@@ -119,12 +121,13 @@ def body_mesh(registration: Registration, settings: FrontSettings | None = None)
 
 
 def _cut(template: Template, margin: float) -> Cut:
-    """The skin within the margin of the outlines, without arms."""
-    distance = np.min([cut_along(template, f"breast_{side}", f"nipple_{side}").distance
-                       for side in SIDES], axis=0)  # fmt: skip
-    level = distance - margin
-    arms = template.regions["arm_left"] | template.regions["arm_right"]
-    level[arms & (distance > 0)] = np.abs(level[arms & (distance > 0)]) + 1e-3
+    """The skin within the margin of the outlines, the corner between them filled, without arms."""
+    left, right = (cut_along(template, f"breast_{side}", f"nipple_{side}").distance
+                   for side in SIDES)  # fmt: skip
+    both = -margin * np.logaddexp(-left / margin, -right / margin)  # a smooth minimum
+    arms = [k for k, bone in enumerate(template.bones) if bone.name.startswith("arm")]
+    of_arms = (template.weights[:, arms].sum(axis=1) - 0.5) * 0.1  # m: a level, no distance
+    level = np.maximum(both - margin, of_arms)
     return cut_at(template, level, f"the outlines of the breasts, a margin of {margin:g} m wider,")
 
 
