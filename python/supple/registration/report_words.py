@@ -61,9 +61,9 @@ def _on_scan(data: ReportData) -> str:
 
 def _sides(data: ReportData) -> str:
     of = data.measures.of
-    lines = [(f"{_plain(name)} ({unit})", _with_sd(of(name, "left")), _with_sd(of(name, "right")))
+    lines = [(f"{_plain(name)} ({unit})", _with_sd(of(name, "right")), _with_sd(of(name, "left")))
              for name, (unit, _) in OF_A_BREAST.items()]  # fmt: skip
-    return rows([*lines, ("grade of ptosis", *(data.measures.ptosis[s] for s in ("left", "right")))])
+    return rows([*lines, ("grade of ptosis", *(data.measures.ptosis[s] for s in ("right", "left")))])
 
 
 def _both(data: ReportData) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError
-from supple.registration.portrait import INK, MARK, PEN
+from supple.registration.portrait import INK, MARK, PEN, skin_colours
 from supple.registration.skin import vertex_normals
 from supple.registration.template import Template
 
@@ -68,7 +68,7 @@ def shown_shapes(template: Template) -> list[tuple[str, Floats]]:
         coefficients = np.zeros(len(template.blendshape_names))
         coefficients[members] = bounds[:, end]
         moved = np.tensordot(coefficients, template.blendshapes, axes=1)
-        title = f"{name.replace('_', ' ')} {bounds[0, end]:+g}"
+        title = f"{name.replace('_', ' ')} {bounds[0, end]:+.2g}"
         found.append((float(np.linalg.norm(moved)), title, coefficients))
     largest = sorted(found, key=lambda item: -item[0])[:_SHAPES]
     return [(title, coefficients) for _, title, coefficients in largest]
@@ -86,8 +86,8 @@ def _body(
     faces = template.triangles[ahead]
     faces = faces[np.argsort(seen[faces, 1].mean(axis=1))]
     if colours is None:
-        axes.tripcolor(seen[:, 0], seen[:, 2], faces, shade, shading="gouraud", cmap="pink",
-                       vmin=-0.5, vmax=1.05)  # fmt: skip
+        axes.tripcolor(seen[:, 0], seen[:, 2], faces, 0.25 + 0.75 * shade, shading="gouraud",
+                       cmap=skin_colours(), vmin=0.1, vmax=1.0)  # fmt: skip
     else:
         from matplotlib.collections import PolyCollection
 
