@@ -15,6 +15,7 @@ namespace {
 
 using Vec3 = Eigen::Vector3d;
 using Index = Eigen::Index;
+constexpr double kPi = 3.14159265358979323846;
 
 /// The voxels that points lie in, numbered as they are met.
 class Voxels {
@@ -83,66 +84,74 @@ std::vector<char> triangle_borders(Index points, const Triangles& triangles) {
   return border;
 }
 
-/// One point a voxel: means of points and normals; at a border if more than a quarter of its
-/// points are.
+/// One point a voxel: means of points and normals; at a border if one in eight of its points is.
 ScanCloud merged(const Points& points, const Points& normals, const std::vector<char>& border,
-                 const Voxels& voxels) {
+                 const Voxels& voxels, Eigen::VectorXd& held) {
   const int count = voxels.count();
   ScanCloud cloud;
   cloud.points = Points::Zero(count, 3);
   cloud.normals = Points::Zero(count, 3);
-  std::vector<int> held(static_cast<std::size_t>(count), 0), edge(held);
+  held.setZero(count);
+  std::vector<int> edge(static_cast<std::size_t>(count), 0);
   for (Index i = 0; i < points.rows(); ++i) {
     const int v = voxels.of(i);
     cloud.points.row(v) += points.row(i);
     if (normals.rows() > 0) cloud.normals.row(v) += normals.row(i);
-    ++held[static_cast<std::size_t>(v)];
+    held[v] += 1.0;
     if (!border.empty()) edge[static_cast<std::size_t>(v)] += border[static_cast<std::size_t>(i)];
   }
+  cloud.points.array().colwise() /= held.array();
   cloud.border.resize(static_cast<std::size_t>(count));
-  for (int v = 0; v < count; ++v) {
-    const std::size_t s = static_cast<std::size_t>(v);
-    cloud.points.row(v) /= held[s];
-    cloud.border[s] = 8 * edge[s] > held[s];
-  }
+  for (int v = 0; v < count; ++v)
+    cloud.border[static_cast<std::size_t>(v)] = 8 * edge[static_cast<std::size_t>(v)] > held[v];
   return cloud;
 }
 
-/// Normals along the least spread of the points around each, and borders where these lie to one
-/// side: the mean of a half disc is 0.42 of its radius away.
-void look_around(ScanCloud& cloud, const PointTree& tree, double radius, bool find_normals) {
+/// What the points within `radius` of each say of it.
+struct Around {
+  Points normal;         ///< along their least spread; 0 of fewer than four
+  Eigen::VectorXd share; ///< m² of the surface: the disc over what its points hold, times its own
+  std::vector<char> border; ///< they lie to one side
+};
+
+/// `held`: scan points that each of the cloud's stands for. The mean of a half disc is 0.42 of its
+/// radius from its centre: that tells a border, and how much of the disc is there.
+Around look_around(const Points& points, const Eigen::VectorXd& held, const PointTree& tree,
+                   double radius) {
+  const Index n = points.rows();
+  Around found{Points::Zero(n, 3), Eigen::VectorXd(n),
+               std::vector<char>(static_cast<std::size_t>(n))};
 #pragma omp parallel for schedule(static)
-  for (Index i = 0; i < cloud.points.rows(); ++i) {
-    const Vec3 centre = cloud.points.row(i).transpose();
+  for (Index i = 0; i < n; ++i) {
+    const Vec3 centre = points.row(i).transpose();
     Vec3 sum = Vec3::Zero();
     Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+    double all = 0.0;
     int count = 0;
     tree.within(centre, radius * radius, [&](int j, double) {
-      const Vec3 offset = cloud.points.row(j).transpose() - centre;
-      sum += offset;
-      moment += offset * offset.transpose();
+      const Vec3 offset = points.row(j).transpose() - centre;
+      sum += held[j] * offset;
+      moment += held[j] * offset * offset.transpose();
+      all += held[j];
       ++count;
     });
-    const Vec3 mean = sum / count;
-    if (find_normals && count >= 4) {
+    const Vec3 mean = sum / all;
+    if (count >= 4) {
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread;
-      spread.computeDirect(moment / count - mean * mean.transpose());
-      cloud.normals.row(i) = spread.eigenvectors().col(0).transpose();
+      spread.computeDirect(moment / all - mean * mean.transpose());
+      found.normal.row(i) = spread.eigenvectors().col(0).transpose();
     }
-    cloud.border[static_cast<std::size_t>(i)] = count < 4 || mean.norm() > 0.28 * radius;
+    const double aside = mean.norm() / radius;
+    found.share[i] = kPi * radius * radius * std::max(1.0 - 1.18 * aside, 0.3) * held[i] / all;
+    found.border[static_cast<std::size_t>(i)] = count < 4 || aside > 0.28;
   }
+  return found;
 }
 
-void share_areas(ScanCloud& cloud, const std::vector<int>& voxel_of, int voxels, double size) {
-  std::vector<int> held(static_cast<std::size_t>(voxels), 0);
-  for (const int v : voxel_of)
-    ++held[static_cast<std::size_t>(v)];
-  cloud.area.resize(cloud.points.rows());
-  for (Index i = 0; i < cloud.points.rows(); ++i) {
-    const double cut = cloud.normals.row(i).cwiseAbs().sum();
-    cloud.area[i] = size * size / (cut > 0.0 ? cut : 1.5) /
-                    held[static_cast<std::size_t>(voxel_of[static_cast<std::size_t>(i)])];
-  }
+/// `normals` of the neighbours' spread, turned to the side of `sides`.
+void turn_to(const Points& sides, Points& normals) {
+  for (Index i = 0; i < normals.rows(); ++i)
+    if (normals.row(i).dot(sides.row(i)) < 0.0) normals.row(i) *= -1.0;
 }
 
 void unit_normals(Points& normals) {
@@ -193,23 +202,25 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
   const std::vector<char> border =
       meshed ? triangle_borders(points.rows(), triangles) : std::vector<char>();
   ScanCloud cloud;
-  std::vector<int> voxel_of;
+  Eigen::VectorXd held;
   if (settings.thin) {
-    cloud = merged(points, found, border, voxels);
-    voxel_of.resize(static_cast<std::size_t>(voxels.count()));
-    std::iota(voxel_of.begin(), voxel_of.end(), 0);
+    cloud = merged(points, found, border, voxels, held);
   } else {
+    held.setOnes(points.rows());
     cloud.points = points;
     cloud.normals = given || meshed ? found : Points::Zero(points.rows(), 3);
-    cloud.border = meshed ? border : std::vector<char>(static_cast<std::size_t>(points.rows()), 0);
-    for (Index i = 0; i < points.rows(); ++i)
-      voxel_of.push_back(voxels.of(i));
+    cloud.border = border;
   }
   cloud.oriented = given || meshed;
-  unit_normals(cloud.normals);
   const PointTree tree(cloud.points);
-  if (!meshed) look_around(cloud, tree, 2.2 * settings.voxel, !given);
-  share_areas(cloud, voxel_of, voxels.count(), settings.voxel);
+  Around around = look_around(cloud.points, held, tree, 2.2 * settings.voxel);
+  if (!given) {
+    if (meshed) turn_to(cloud.normals, around.normal);
+    cloud.normals.swap(around.normal);
+  }
+  if (!meshed) cloud.border.swap(around.border);
+  unit_normals(cloud.normals);
+  cloud.area = around.share;
   return ordered(cloud, tree.order());
 }
 

@@ -7,9 +7,9 @@ namespace supple {
 
 /// One point a voxel (the mean), or every point as it is; in an order that is local in space.
 ///
-/// Normals come from `normals`, else from the triangles, else from the spread of the neighbours,
-/// which leaves their sign open. A point stands for its share of its voxel's surface,
-/// h²/(|n_x| + |n_y| + |n_z|), so the density of the scan does not count.
+/// Normals are `normals`, else the direction in which the neighbours spread least, which noise
+/// disturbs less than the triangles' own; those tell its sign, which stays open without them. A
+/// point stands for its share of the disc around it, so the density of the scan does not count.
 ScanCloud prepared(const Points& points, const Triangles& triangles, const Points& normals,
                    const ScanSettings& settings);
 

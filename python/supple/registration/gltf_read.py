@@ -95,7 +95,7 @@ class _Reader:
         if a.type != width or a.componentType not in _DTYPES:
             raise MeshError(f"{self.file} must hold {kind} as {width}, got {a.type}; {_AGAIN}.")
         if rows is not None and a.count != rows:
-            raise MeshError(f"{self.file} must hold {rows} rows of {kind}, got {a.count}; {_AGAIN}.")
+            raise MeshError(f"{self.file} must hold {kind} for {rows}, got {a.count}; {_AGAIN}.")
         return self._rows(a, views[a.bufferView], kind)
 
     def _rows(self, accessor: Any, view: Any, kind: str) -> Any:
@@ -105,8 +105,8 @@ class _Reader:
         begin = (view.byteOffset or 0) + (accessor.byteOffset or 0)
         end = begin + stride * (accessor.count - 1) + row
         if accessor.count < 1 or begin < 0 or stride < row or end > len(self.blob):
-            raise MeshError(f"{self.file} must hold {end} bytes for {kind}, got {len(self.blob)}: it "
-                            "is cut off; copy it again.")  # fmt: skip
+            raise MeshError(f"{self.file} must hold {end} bytes for {kind}, got {len(self.blob)}: "
+                            "it is cut off; copy it again.")  # fmt: skip
         array = np.ndarray((accessor.count, columns), dtype, self.blob, begin,
                            (stride, dtype.itemsize))  # fmt: skip
         whole = dtype.kind in "iu" and accessor.normalized
@@ -115,36 +115,43 @@ class _Reader:
 
 def template(document: Any, blob: bytes, file: Path) -> Template:
     """The template in a document."""
-    reader = _Reader(document, blob, file)
-    mesh, skin, primitive = _parts(document, file)
-    attributes = vars(primitive.attributes)
-    points = reader.array(attributes.get("POSITION"), "POSITION", "VEC3")
-    n = len(points)
-    bones = _bones(document, skin, reader)
-    shapes = [_lps(reader.array(target.get("POSITION"), "a morph target", "VEC3", n))
-              for target in map(_dict, primitive.targets or [])]  # fmt: skip
-    extras = mesh.extras["supple"]
     try:
-        return Template(
-            _lps(points),
-            reader.array(primitive.indices, "triangles", "SCALAR").astype(np.int64).reshape(-1, 3),
-            bones, _weights(attributes, len(bones), n, reader), np.array(shapes).reshape(-1, n, 3),
-            tuple(mesh.extras.get("targetNames", ())),
-            np.array(extras["blendshapeBounds"], dtype=np.float64).reshape(-1, 2),
-            *(_marked(extras[kind]) for kind in ("landmarks", "curves")),
-            {name: _mask(ids, n) for name, ids in extras["regions"].items()},
-            np.array(extras["mirror"], dtype=np.int64), mesh.name or "torso", extras["source"],
-        )  # fmt: skip
+        return _template(document, _Reader(document, blob, file))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise MeshError(f"{file} must hold a whole template, got a fault in its drawing or numbers "
                         f"({type(error).__name__}: {error}); {_AGAIN}.") from None  # fmt: skip
 
 
+def _template(document: Any, reader: _Reader) -> Template:
+    mesh, skin, primitive = _parts(document, reader.file)
+    attributes = _dict(primitive.attributes)
+    points = _lps(reader.array(attributes.get("POSITION"), "POSITION", "VEC3"))
+    n, bones, extras = len(points), _bones(document, skin, reader), mesh.extras["supple"]
+    triangles = reader.array(primitive.indices, "triangles", "SCALAR").astype(np.int64)
+    shapes = [_lps(reader.array(target.get("POSITION"), "a morph target", "VEC3", n))
+              for target in map(_dict, primitive.targets or [])]  # fmt: skip
+    bounds = np.array(extras["blendshapeBounds"], dtype=np.float64).reshape(-1, 2)
+    regions = {name: _mask(ids, n) for name, ids in extras["regions"].items()}
+    mirror = np.array(extras["mirror"], dtype=np.int64)
+    if mirror.shape != (n,):
+        raise ValueError(f"mirror has shape {mirror.shape} for {n} vertices")
+    weights = _weights(attributes, len(bones), n, reader)
+    try:
+        return Template(
+            points, triangles.reshape(-1, 3), bones, weights, np.array(shapes).reshape(-1, n, 3),
+            tuple(mesh.extras.get("targetNames", ())), bounds, _marked(extras["landmarks"]),
+            _marked(extras["curves"]), regions, mirror,
+            mesh.name or "torso", str(extras["source"]),
+        )  # fmt: skip
+    except InputError as error:
+        raise type(error)(f"{reader.file}: {error}") from None
+
+
 def _parts(document: Any, file: Path) -> tuple[Any, Any, Any]:
     """Its one mesh, that mesh's skin and primitive."""
     if len(document.meshes) != 1 or len(document.meshes[0].primitives) != 1:
-        raise InputError(f"{file} must hold one mesh of one part, got {len(document.meshes)} meshes; "
-                         f"{_AGAIN}.")  # fmt: skip
+        raise InputError(f"{file} must hold one mesh of one part, got {len(document.meshes)} "
+                         f"meshes; {_AGAIN}.")  # fmt: skip
     mesh, primitive = document.meshes[0], document.meshes[0].primitives[0]
     carriers = [node for node in document.nodes if node.mesh == 0 and node.skin is not None]
     if not carriers or not 0 <= carriers[0].skin < len(document.skins):
@@ -153,8 +160,8 @@ def _parts(document: Any, file: Path) -> tuple[Any, Any, Any]:
         raise InputError(f"{file} must be of triangles, got mode {primitive.mode}; {_AGAIN}.")
     extras = (mesh.extras or {}).get("supple")
     if not isinstance(extras, dict) or extras.get("layout") != LAYOUT:
-        raise InputError(f"{file} must carry landmarks and curves as extras of layout {LAYOUT}, got "
-                         f"none; {_AGAIN}.")  # fmt: skip
+        raise InputError(f"{file} must carry landmarks and curves as extras of layout {LAYOUT}, "
+                         f"got none; {_AGAIN}.")  # fmt: skip
     return mesh, document.skins[carriers[0].skin], primitive
 
 
@@ -205,12 +212,17 @@ def _weights(attributes: dict[str, Any], bones: int, n: int, reader: _Reader) ->
 
 
 def _marked(parts: dict[str, Any]) -> dict[str, OnSurface]:
-    return {
-        name: OnSurface(np.array(part["triangle"], dtype=np.int64),
-                        np.array(part["barycentric"], dtype=np.float64).reshape(-1, 3),
-                        bool(part["closed"]))
-        for name, part in parts.items()
-    }  # fmt: skip
+    return {name: _on_surface(name, part) for name, part in parts.items()}
+
+
+def _on_surface(name: str, part: dict[str, Any]) -> OnSurface:
+    triangle = np.array(part["triangle"], dtype=np.int64)
+    share = np.array(part["barycentric"], dtype=np.float64)
+    if share.shape != (len(triangle), 3) or not (abs(share.sum(axis=1) - 1) < 1e-9).all():
+        raise ValueError(f"{name} needs three shares a triangle that sum to 1")
+    if (triangle < 0).any():
+        raise ValueError(f"{name} names triangle {triangle.min()}")
+    return OnSurface(triangle, share, bool(part["closed"]))
 
 
 def _mask(ids: list[int], n: int) -> npt.NDArray[np.bool_]:

@@ -80,7 +80,7 @@ def packed(document: Any, embedded: bool) -> bytes:
     """The bytes of a .glb file, or those of a .gltf file with its buffer ``embedded``."""
     import pygltflib as gltf
 
-    blob = document.binary_blob()
+    blob: bytes = document.binary_blob()
     if embedded:
         document.convert_buffers(gltf.BufferFormat.DATAURI)
         return bytes(document.gltf_to_json().encode("utf-8"))
@@ -135,10 +135,9 @@ def _influences(weights: Floats) -> list[tuple[npt.NDArray[np.uint8], npt.NDArra
     ranked = np.take_along_axis(weights, order, axis=1)
     sets = -(-int((ranked > 0).sum(axis=1).max()) // 4)
     padding = ((0, 0), (0, max(4 * sets - weights.shape[1], 0)))
-    order, ranked = (np.pad(array, padding)[:, : 4 * sets] for array in (order, ranked))
-    order = np.where(ranked > 0, order, 0)
-    return [(order[:, k : k + 4].astype(np.uint8), ranked[:, k : k + 4].astype(np.float32))
-            for k in range(0, 4 * sets, 4)]  # fmt: skip
+    values = np.pad(ranked, padding)[:, : 4 * sets].astype(np.float32)
+    bones = np.where(values > 0, np.pad(order, padding)[:, : 4 * sets], 0).astype(np.uint8)
+    return [(bones[:, k : k + 4], values[:, k : k + 4]) for k in range(0, 4 * sets, 4)]
 
 
 def _nodes(template: Template) -> list[Any]:

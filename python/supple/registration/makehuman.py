@@ -23,27 +23,28 @@ Floats = npt.NDArray[np.float64]
 
 SOURCE = (
     "hm08 body, targets, rig and weights of MakeHuman, (c) 2020 Data Collection AB, J. Palmius, "
-    "J. Hauquier; CC0"
+    "J. Hauquier, 2021 Elvaerwyn; CC0"
 )
 _PEOPLES = ("african", "asian", "caucasian")
 _FULL = "breast/female-young-averagemuscle-averageweight-maxcup-averagefirmness"
 _NIPPLE = "breast/nipple-point-incr"
 _HIPS = 0.05  #: height of the lower cut, m
-_NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])  #: a point of the cut, and its normal
+#: A point of the neck's cut, m, and its normal.
+_NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])
 _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
 #: Where the breast begins: geometric mean of its bone's weight and of its move by a fuller cup.
 _OUTLINE = 0.2
 
 
-def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0175) -> Template:
+def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0185) -> Template:
     """The torso of an average young woman, 1.59 m tall.
 
     Args:
         folder: laid out as MakeHuman's data: 3dobjs/base.obj, targets/, rigs/.
         mpfb: laid out as MPFB 2's data, for its table of mirrored vertices; without it they are
             found by place.
-        spacing: longest edge on the breasts, m, as far as one division goes; twice that elsewhere.
-            0.0175 gives about 2,200 vertices.
+        spacing: longest edge on the breasts, m, as they are or half a cup range fuller, as far as
+            one division goes; twice that elsewhere. 0.0185 gives about 2,200 vertices.
 
     Raises:
         InputError: a file is missing or not MakeHuman's.
@@ -51,10 +52,11 @@ def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0175) -> Te
     """
     base = read_base(Path(folder), None if mpfb is None else Path(mpfb))
     woman = base.points + sum(base.target(f"macrodetails/{p}-female-young") for p in _PEOPLES) / 3
-    full = np.linalg.norm(base.target(_FULL), axis=1)
+    more = base.target(_FULL)
     half = _cut(base, woman)
-    longest = np.where(half.means @ full > 0.05 * full.max(), spacing, 2 * spacing)
-    half = refined(half, woman, base.mirror, longest)
+    full = half.means @ np.linalg.norm(more, axis=1)
+    longest = np.where(full > 0.1 * full.max(), spacing, 2 * spacing)
+    half = refined(half, woman, woman + more / 2, base.mirror, longest)
     return _template(base, woman, half)
 
 

@@ -77,7 +77,7 @@ def _clip(
 ) -> list[list[int]]:
     """The parts of polygons on the negative side; new vertices are appended to ``means``."""
     value = np.array([sum(w * side[k] for k, w in mean.items()) for mean in means])
-    edges = {tuple(sorted(e)) for p in polygons for e in zip(p, p[1:] + p[:1], strict=True)}
+    edges = {(min(e), max(e)) for p in polygons for e in zip(p, p[1:] + p[:1], strict=True)}
     crossing = sorted(e for e in edges if value[e[0]] * value[e[1]] < 0)
     share = {e: float(value[e[0]] / (value[e[0]] - value[e[1]])) for e in crossing}
     nearest: dict[int, tuple[float, tuple[int, int]]] = {}

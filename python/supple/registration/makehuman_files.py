@@ -38,30 +38,34 @@ class BaseMesh:
         file = existing(self.folder / "targets" / f"{name}.target")
         rows = _rows(file, 4)
         moved = np.zeros_like(self.points)
-        ids = rows[:, 0].astype(np.int64)
-        if len(ids) and (ids.min() < 0 or ids.max() >= len(moved)):
-            raise MeshError(f"{file} moves vertex {ids.max()}, the base mesh has {len(moved)}; "
-                            "take both from one release of MakeHuman.")  # fmt: skip
-        moved[ids] = _lps(rows[:, 1:])
+        moved[self._checked(rows[:, 0], file)] = _lps(rows[:, 1:])
         return moved
 
     def weights(self) -> dict[str, Floats]:
         """Of each bone of the default rig, its weights (n,)."""
-        table = _json(self.folder / "rigs" / "default_weights.mhw", "weights")
+        file = self.folder / "rigs" / "default_weights.mhw"
         result = {}
-        for bone, pairs in table.items():
+        for bone, pairs in _json(file, "weights").items():
             result[bone] = np.zeros(len(self.points))
             ids, values = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
-            result[bone][ids.astype(np.int64)] = values
+            result[bone][self._checked(ids, file)] = values
         return result
 
     def joints(self) -> dict[str, Ints]:
         """Of each head of a bone of the default rig, the vertices whose mean it is."""
-        table = _json(self.folder / "rigs" / "default.mhskel", "joints")
+        file = self.folder / "rigs" / "default.mhskel"
         return {
-            name.removesuffix("____head"): np.array(ids, dtype=np.int64)
-            for name, ids in table.items() if name.endswith("____head")
+            name.removesuffix("____head"): self._checked(np.array(ids), file)
+            for name, ids in _json(file, "joints").items() if name.endswith("____head")
         }  # fmt: skip
+
+    def _checked(self, ids: npt.NDArray[np.generic], file: Path) -> Ints:
+        """Vertex ids as integers; MeshError where the mesh has no such vertex."""
+        result = ids.astype(np.int64)
+        if len(result) and not 0 <= result.min() <= result.max() < len(self.points):
+            raise MeshError(f"{file} must name vertices 0 to {len(self.points) - 1} of base.obj, "
+                            f"got {result.max()}; take both from one release.")  # fmt: skip
+        return result
 
 
 def read_base(folder: Path, mpfb: Path | None) -> BaseMesh:
@@ -100,7 +104,10 @@ def _obj(file: Path) -> tuple[Floats, Ints]:
             quads.append([corner.split("/")[0] for corner in rest])
     try:
         faces = np.array(quads, dtype=np.int64).reshape(len(quads), 4) - 1
-        return _lps(np.array(points, dtype=np.float64).reshape(-1, 3)), faces
+        places = _lps(np.array(points, dtype=np.float64).reshape(-1, 3))
+        if not 0 <= faces.min() <= faces.max() < len(places):
+            raise ValueError
+        return places, faces
     except ValueError:
         raise MeshError(f"{file} must have a group 'body' of quads; take hm08 unchanged.") from None
 
@@ -117,17 +124,21 @@ def _mirror(points: Floats, file: Path) -> Ints:
 
 
 def _mirror_table(file: Path, n: int) -> Ints:
-    pairs = np.array([line.split()[:2] for line in _text(existing(file)).splitlines() if line])
+    pairs = [line.split()[:2] for line in _text(existing(file)).splitlines() if line]
     mirror = np.arange(n)
-    ids = pairs.astype(np.int64)
-    mirror[ids[:, 0]] = ids[:, 1]
+    try:
+        ids = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        mirror[ids[:, 0]] = ids[:, 1]
+        mirror[mirror]
+    except (ValueError, IndexError):
+        raise InputError(f"{file} must hold two of {n} vertices a line; take hm08's.") from None
     return mirror
 
 
 def _rows(file: Path, columns: int) -> Floats:
-    lines = (line.split() for line in _text(file).splitlines() if line and line[0] != "#")
+    words = [w for line in _text(file).splitlines() if line[:1] != "#" for w in line.split()]
     try:
-        return np.array([line for line in lines if line], dtype=np.float64).reshape(-1, columns)
+        return np.fromiter(map(float, words), np.float64, len(words)).reshape(-1, columns)
     except ValueError:
         raise InputError(f"{file} must hold {columns} numbers a line; get it again.") from None
 

@@ -57,7 +57,7 @@ class Skin:
         on = self.points[np.abs(self.points[:, 0]) < 1e-9]
         spine = np.median(on[:, 1])
         line = on[(on[:, 1] < spine) == front]
-        return line[np.argsort(line[:, 2])]
+        return np.asarray(line[np.argsort(line[:, 2])])
 
     def profile(self, low: float, high: float, count: int) -> Floats:
         """Points (count, 3) m on the front's profile between two heights, evenly in height."""
@@ -84,7 +84,7 @@ class Skin:
                 ends.setdefault(one, []).append(other)
         loops = _loops(ends)
         if not loops:
-            raise MeshError("the targets must move a breast with a closed outline; take them unchanged.")
+            raise MeshError("the targets must move a breast with a closed outline; take hm08's.")
         edges = np.array(max(loops, key=len))
         share = (level - field[edges[:, 0]]) / (field[edges[:, 1]] - field[edges[:, 0]])
         line = self.points[edges[:, 0]] * (1 - share[:, None])
@@ -143,8 +143,9 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
         "breast_lateral": skin.nearest(around[around[:, 0].argmax()]),
         "breast_inferior": skin.nearest(around[around[:, 2].argmin()]),
     }
+    fold = float(around[:, 2].min())
     result = {"sternal_notch": skin.nearest(_notch(skin)),
-              "xiphoid": skin.nearest(skin.profile(*[around[:, 2].min()] * 2, 1))}  # fmt: skip
+              "xiphoid": skin.nearest(skin.profile(fold, fold, 1))}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
@@ -157,16 +158,16 @@ def _notch(skin: Skin, window: float = 0.02) -> Floats:
     angle = np.arctan(np.gradient(np.interp(z, line[:, 2], line[:, 1]), z))
     steps = round(window / 1e-4)
     turn = angle[steps:] - angle[:-steps]
-    height = z[int(np.argmin(turn)) + steps // 2]
-    return skin.profile(height, height, 1)[0]
+    height = float(z[int(np.argmin(turn)) + steps // 2])
+    return np.asarray(skin.profile(height, height, 1)[0])
 
 
 def _axilla(skin: Skin, arm: Floats) -> Floats:
-    """The anterior axillary fold: the lowest place of the front where arm and chest share evenly."""
+    """The anterior axillary fold: the lowest place in front where arm and chest share the skin."""
     line = skin.outline(arm, 0.45, 400)
     normal = skin.normals()[skin.nearest(line).triangle]
     front = line[normal[:, 1] < -0.5]
-    return front[front[:, 2].argmin()]
+    return np.asarray(front[front[:, 2].argmin()])
 
 
 def curves(skin: Skin, marks: dict[str, OnSurface], outline: OnSurface) -> dict[str, OnSurface]:

@@ -14,37 +14,34 @@ Ints = npt.NDArray[np.int64]
 Edge = tuple[int, int]
 
 
-def refined(half: Half, points: Floats, mirror: Ints, longest: Floats) -> Half:
+def refined(half: Half, points: Floats, fuller: Floats, mirror: Ints, longest: Floats) -> Half:
     """Edges longer than the mean ``longest`` (h,) m of their ends divided once, conformingly.
 
-    ``points`` (n, 3) m and ``mirror`` (n,) are those of all the mesh. Of the vertices, the old
-    ones stay; the new ones minimise the thin-plate energy |M^-1/2 L x|² with the cotangent
-    Laplacian L, so their positions, and all else at them, stay linear in the values of the mesh.
+    ``points`` (n, 3) m and ``mirror`` (n,) are those of all the mesh; an edge is as long as it is
+    there or in the ``fuller`` shape (n, 3) m, whichever is more. The old vertices stay; the new
+    ones minimise the thin-plate energy |M^-1/2 L x|² with the cotangent Laplacian L, so that
+    their positions, and all else at them, stay linear in the values of the mesh.
     """
     at = half.means @ points
-    split = _long(half.triangles, at, longest)
+    split = _long(half.triangles, (at, half.means @ fuller), longest)
     if not split:
         return half
     ends = np.array(list(split))
     triangles = _divided(half.triangles, split, at)
-    flat = _halved(half.means, ends)
     middle = np.concatenate([half.middle, half.middle[ends].all(axis=1)])
-    coarse = Half(flat, triangles, middle)
-    means, whole, image = coarse.whole(mirror)
+    means, whole, image = Half(_halved(half.means, ends), triangles, middle).whole(mirror)
     new = np.arange(len(at), len(middle))
-    rim = _rim(whole)
-    free = np.union1d(new, image[new])
-    free = free[~np.isin(free, rim)]
+    free = np.setdiff1d(np.union1d(new, image[new]), _rim(whole))
     means = _faired(means, whole, means @ points, free)
     return Half(means[: len(middle)], triangles, middle)
 
 
-def _long(triangles: Ints, at: Floats, longest: Floats) -> dict[Edge, int]:
+def _long(triangles: Ints, shapes: tuple[Floats, ...], longest: Floats) -> dict[Edge, int]:
     """Which edges to divide, and the numbers of the vertices on them."""
     edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    length = np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1)
+    length = np.max([np.linalg.norm(p[edges[:, 0]] - p[edges[:, 1]], axis=1) for p in shapes], 0)
     chosen = edges[length > longest[edges].mean(axis=1)].tolist()
-    return {(a, b): len(at) + k for k, (a, b) in enumerate(chosen)}
+    return {(a, b): len(longest) + k for k, (a, b) in enumerate(chosen)}
 
 
 def _divided(triangles: Ints, split: dict[Edge, int], at: Floats) -> Ints:
@@ -88,14 +85,13 @@ def _rim(triangles: Ints) -> Ints:
 def _faired(means: Any, triangles: Ints, at: Floats, free: Ints) -> Any:
     """``means`` with its rows ``free`` where (M^-1 L)ᵀ M (M^-1 L) x = 0, all other rows held."""
     from scipy import sparse
-    from scipy.sparse.linalg import splu
 
     stiffness, mass = laplacian(at, triangles)
     bending = (stiffness.T @ sparse.diags_array(1 / mass) @ stiffness).tocsr()
     held = np.setdiff1d(np.arange(len(at)), free)
     force = -(bending[free][:, held] @ means[held]).tocsc()
     columns = np.flatnonzero(np.diff(force.indptr))
-    solved = splu(bending[free][:, free].tocsc()).solve(force[:, columns].toarray())
+    solved = np.linalg.solve(bending[free][:, free].toarray(), force[:, columns].toarray())
     solved[np.abs(solved) < 1e-6] = 0
     solved /= solved.sum(axis=1, keepdims=True)
     rows, used = np.nonzero(solved)
@@ -124,4 +120,4 @@ def laplacian(at: Floats, triangles: Ints) -> tuple[Any, Floats]:
         stiffness = stiffness - half - half.T
     stiffness = stiffness - sparse.diags_array(np.asarray(stiffness.sum(axis=1)).ravel())
     mass = np.bincount(triangles.ravel(), np.repeat(double / 6, 3), minlength=n)
-    return stiffness.tocsr(), mass
+    return stiffness.tocsr(), np.asarray(mass, dtype=np.float64)

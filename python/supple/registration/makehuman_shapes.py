@@ -78,7 +78,7 @@ ARM: dict[str, tuple[str, ...]] = {
 #: Half the breadth over which a shape of both breasts goes over from one side to the other, m.
 _BLEND = 0.03
 #: Cosine above which a pair of targets counts as one line.
-_OPPOSITE = 0.9
+_OPPOSITE = 0.82
 #: Least part of a shape, as a share of its norm, that bones and the shapes before it leave over.
 _OWN = 0.15
 #: Shapes that move nothing by more are left out, m.
@@ -98,7 +98,7 @@ class Shapes:
 def shapes(read: Read, points: Floats, mirror: Ints, moves: Floats) -> Shapes:
     """All of them; ``read(target)`` gives (n, 3) m at the template's ``points`` (n, 3) m.
 
-    A pair of targets becomes one line where they are opposite to a cosine of −0.9 or beyond;
+    A pair of targets becomes one line where they are opposite to a cosine of −0.82 or beyond;
     its bounds are the targets' places on it. Else each is a shape of its own from 0 to 1.
     What targets of the whole body do to the torso as a rigid body is taken off: it stands on the
     ground there. ``moves`` (m, n, 3) are the bones' own, which need no shape.

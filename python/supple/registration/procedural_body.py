@@ -139,9 +139,15 @@ def breast(p: Floats) -> tuple[Floats, Floats]:
     slope = ellipsoid(q - (-0.002, 0.026, -0.030), (0.058, 0.080, 0.046))
     mound = smooth_min(pole, slope, 0.05)
     areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
-    nipple = np.linalg.norm(q - NIPPLE, axis=1) - 0.0055
-    softness = 0.016 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
+    nipple = np.linalg.norm(q - NIPPLE + (0.0, 0.0, 0.003), axis=1) - 0.0055
+    softness = 0.021 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
     return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
+
+
+def nipple() -> Floats:
+    """The tip (3,) m of the left one."""
+    before = NIPPLE * (1.0, 1.0, 0.0) + (0.0, 0.0, 0.1)
+    return np.asarray(met((BREAST + before @ BREAST_AXES)[None], -BREAST_AXES[2])[0])
 
 
 def cone(p: Floats, a: tuple[float, ...], b: tuple[float, ...], ra: float, rb: float) -> Floats:

@@ -56,11 +56,11 @@ BREAST_SHAPES: dict[str, Field] = {
     "breast_up_left": _in_breast(lambda q, r: (0.0, 0.010, 0.0)),
     "breast_lateral_left": _in_breast(lambda q, r: (0.008, 0.0, 0.0)),
     "breast_ptosis_left": _in_breast(
-        lambda q, r: (0.0, -0.014 * r**1.5, -0.004 * r * (q[:, 1] > -1))),
+        lambda q, r: (0.0, -0.014 * r**1.5, -0.003 * r)),
     "breast_sag_left": _in_breast(
         lambda q, r: (0.0, -0.010 * r * smooth(-q[:, 1] / 0.06), 0.004 * r)),
-    "breast_turn_left": _in_breast(lambda q, r: (0.010 * r, 0.0, 0.0)),
-    "breast_tilt_left": _in_breast(lambda q, r: (0.0, 0.008 * r, 0.0)),
+    "breast_turn_left": _in_breast(lambda q, r: (0.010 * r, 0.0, -0.15 * q[:, 0])),
+    "breast_tilt_left": _in_breast(lambda q, r: (0.0, 0.008 * r, -0.15 * q[:, 1])),
     "breast_point_left": _in_breast(
         lambda q, r: (-0.08 * q[:, 0] * r, -0.08 * q[:, 1] * r, 0.006 * r**3)),
     "breast_lower_pole_left": _swell(0.0, -0.035, (0.055, 0.045), 0.007),

@@ -17,21 +17,18 @@ Floats = npt.NDArray[np.float64]
 
 NOTCH, XIPHOID = 0.140, -0.030  #: heights of the ends of the sternum, m
 AXILLA = np.array([0.152, -0.012, 0.056])  #: near the left one, m
-_CORNERS = np.array([np.pi, 0.0, -np.pi / 2])  # medial, lateral and inferior on an outline
+_MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
+_MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
 
 
 def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
     """Landmarks and curves on the triangles of ``skin``; those on the right are mirror images."""
-    places = _places()
-    near = Surface(skin.points, skin.triangles).closest(np.vstack(list(places.values())))
-    ends = np.cumsum([len(points) for points in places.values()])[:-1]
-    triangles = np.split(np.asarray(near.triangle, dtype=np.int64), ends)
-    weights = np.split(np.asarray(near.barycentric), ends)
-    found: dict[str, OnSurface] = {}
-    for name, triangle, weight in zip(places, triangles, weights, strict=True):
-        found[name] = OnSurface(triangle, weight, closed=name == "breast_left")
-        if name.endswith("_left"):
-            found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
+    found = {name: _on_midline(skin, np.array([z])) for name, z in _MIDDLE.items()}
+    found |= {"sternum_arrow_upper": _arrow(skin, NOTCH - 0.004, _MEET + 0.010),
+              "sternum_arrow_lower": _arrow(skin, XIPHOID + 0.004, _MEET - 0.010)}  # fmt: skip
+    for name, points in _left_places().items():
+        found[name] = _nearest(skin, points, closed=name == "breast_left")
+        found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
     return {name: found[name] for name in LANDMARKS}, {name: found[name] for name in CURVES}
 
 
@@ -65,46 +62,54 @@ def mirrored(skin: Skin, part: OnSurface) -> OnSurface:
     return OnSurface(other, part.barycentric[:, [0, 2, 1]], part.closed)
 
 
+def _nearest(skin: Skin, points: Floats, closed: bool = False) -> OnSurface:
+    """The points of the left half closest to ``points`` (k, 3) m."""
+    half = Surface(skin.points, skin.triangles[: len(skin.triangles) // 2])
+    near = half.closest(points)
+    return OnSurface(
+        np.asarray(near.triangle, dtype=np.int64), np.asarray(near.barycentric), closed
+    )
+
+
 @cache
-def _places() -> dict[str, Floats]:
-    """Points (k, 3) m of the midline and of the left: each landmark and each curve."""
+def _left_places() -> dict[str, Floats]:
+    """Points (k, 3) m of the left: of each landmark and of the breast's outline."""
     outline = np.pi + np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    on_breast = np.vstack([body.NIPPLE[None, :2], _outline(_CORNERS), _outline(outline)])
-    nipple, medial, lateral, inferior, *breast = _on_breast(on_breast)
-    middle = (NOTCH + XIPHOID) / 2
+    on_base = BASE + BASE_RADII * np.stack([np.cos(outline), np.sin(outline)], axis=1)
+    start = body.BREAST + on_base @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
+    line = body.met(start, -body.BREAST_AXES[2])
     return {
-        "sternal_notch": _midline(np.array([NOTCH])),
-        "xiphoid": _midline(np.array([XIPHOID])),
-        "nipple_left": nipple[None],
+        "nipple_left": body.nipple()[None],
         "axilla_left": AXILLA[None],
-        "breast_medial_left": medial[None],
-        "breast_lateral_left": lateral[None],
-        "breast_inferior_left": inferior[None],
-        "sternum_arrow_upper": _arrow(NOTCH - 0.004, middle + 0.010),
-        "sternum_arrow_lower": _arrow(XIPHOID + 0.004, middle - 0.010),
-        "breast_left": np.array(breast),
+        "breast_medial_left": line[:1],
+        "breast_inferior_left": line[12:13],
+        "breast_lateral_left": line[24:25],
+        "breast_left": line,
     }
 
 
-def _outline(angle: Floats) -> Floats:
-    """Places (k, 2) m on the base of the left breast, to the side and up, in its axes."""
-    return np.asarray(BASE + BASE_RADII * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+def _on_midline(skin: Skin, heights: Floats) -> OnSurface:
+    """Where the planes z = ``heights`` (k,) m cut the front's midline, on edges of the left."""
+    x, y, z = skin.points.T
+    left = skin.triangles[: len(skin.triangles) // 2]
+    triangle, corner = np.nonzero((x[left] == 0) & (x[np.roll(left, -1, axis=1)] == 0))
+    a, b = left[triangle, corner], left[triangle, (corner + 1) % 3]
+    cuts = (z[a] - heights[:, None]) * (z[b] - heights[:, None]) <= 0
+    edge = np.where(cuts, (y[a] + y[b]) / 2, np.inf).argmin(axis=1)
+    share = (heights - z[a[edge]]) / (z[b[edge]] - z[a[edge]])
+    barycentric = np.zeros((len(heights), 3))
+    rows = np.arange(len(heights))
+    barycentric[rows, corner[edge]] = 1 - share
+    barycentric[rows, (corner[edge] + 1) % 3] = share
+    return OnSurface(triangle[edge], barycentric)
 
 
-def _on_breast(place: Floats) -> Floats:
-    """Points (k, 3) m of the skin before places (k, 2) m in the left breast's axes."""
-    start = body.BREAST + place @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
-    return body.met(start, -body.BREAST_AXES[2])
-
-
-def _midline(height: Floats) -> Floats:
-    start = np.stack([0 * height, 0 * height - 0.2, height], axis=1)
-    return body.met(start, np.array([0.0, 1.0, 0.0]))
-
-
-def _arrow(start: float, tip: float) -> Floats:
-    """Shaft, tip, one barb, tip, other barb: points (k, 3) m before the skin of the midline."""
-    along = np.append(np.linspace(start, tip, 12), tip + 0.012 * np.sign(start - tip))
-    *shaft, back = _midline(along)
-    side = np.array([0.008, 0.0, 0.0])
-    return np.vstack([*shaft, back + side, shaft[-1], back - side])
+def _arrow(skin: Skin, start: float, tip: float) -> OnSurface:
+    """On the midline from ``start`` to ``tip`` (heights, m), left barb, tip, right barb."""
+    shaft = _on_midline(skin, np.linspace(start, tip, 12))
+    back = _on_midline(skin, np.array([tip + 0.012 * np.sign(start - tip)]))
+    barb = _nearest(skin, back.at(skin.points, skin.triangles) + np.array([0.008, 0.0, 0.0]))
+    end = OnSurface(shaft.triangle[-1:], shaft.barycentric[-1:])
+    parts = (shaft, barb, end, mirrored(skin, barb))
+    return OnSurface(np.concatenate([part.triangle for part in parts]),
+                     np.vstack([part.barycentric for part in parts]))  # fmt: skip

@@ -37,17 +37,17 @@ def weights(points: Floats) -> Floats:
     """(n, 9) of the bones at ``points`` (n, 3) m: ≥ 0, rows sum to 1, smooth in the place."""
     p = left(points)
     arm, rest = _split(np.ones(len(p)), arm_part(p))
-    shoulder, rest = _split(
-        rest, smooth((p[:, 0] - 0.045) / 0.09) * smooth((p[:, 2] - 0.05) / 0.08)
-    )
+    girdle = smooth((p[:, 0] - 0.045) / 0.09) * smooth((p[:, 2] - 0.04) / 0.10)
+    shoulder, rest = _split(rest, girdle)
     neck, rest = _split(rest, smooth(((p - body.NECK) @ body.NECK_AXIS + 0.005) / 0.08))
-    breast, rest = _split(rest, smooth((1.15 - breast_radius(p)) / 0.9))
+    breast, rest = _split(rest, smooth((1.28 - breast_radius(p)) / 1.10))
     chest, abdomen = _split(rest, smooth((p[:, 2] + 0.18) / 0.15))
     parts = {"arm": arm, "shoulder": shoulder, "neck": neck, "breast": breast, "chest": chest,
              "abdomen": abdomen}  # fmt: skip
-    columns = [parts[name.split("_")[0]] * _on_side(name, points) for name, _ in BONES]
-    whole = np.stack(columns, axis=1)
-    return np.asarray(whole / whole.sum(axis=1, keepdims=True))
+    whole = sum(parts.values())  # 1 but for rounding, which must not differ between the sides
+    return np.stack(
+        [parts[name.split("_")[0]] / whole * _on_side(name, points) for name, _ in BONES], axis=1
+    )
 
 
 def _split(whole: Floats, share: Floats) -> tuple[Floats, Floats]:
@@ -75,7 +75,7 @@ def smooth(t: Floats) -> Floats:
 def arm_part(p: Floats) -> Floats:
     """How much (n,) each point on the left belongs to the arm: by its place along and off it."""
     along = (p - body.SHOULDER) @ body.ARM
-    return smooth((along + 0.045) / 0.09) * smooth((body.trunk(p) - body.arm(p) + 0.01) / 0.05)
+    return smooth((along + 0.05) / 0.12) * smooth((body.trunk(p) - body.arm(p) + 0.014) / 0.07)
 
 
 def breast_radius(p: Floats) -> Floats:

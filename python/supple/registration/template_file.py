@@ -1,4 +1,4 @@
-"""A template as a glTF 2.0 file, which carries skin, bones and blendshapes into Blender and back."""
+"""A template as a glTF 2.0 file, which carries skin, bones and blendshapes into Blender."""
 
 from __future__ import annotations
 
@@ -47,5 +47,5 @@ def read_template(path: str | Path) -> Template:
 
 def _checked(file: Path) -> Path:
     if file.suffix.lower() not in _FORMATS:
-        raise InputError(f"a template's path must end in {' or '.join(_FORMATS)}, got {file.name!r}.")
+        raise InputError(f"path must end in {' or '.join(_FORMATS)}, got {file.name!r}.")
     return file
