@@ -33,7 +33,7 @@ def words(data: ReportData) -> dict[str, str]:
         "said": bullets(data.said),
         "meanings": rows((_plain(k), v[1]) for k, v in (OF_A_BREAST | OF_BOTH).items()),
         "versions": rows(data.versions.items()),
-        "sd_toggle": "" if data.registration.sd is not None else "hidden",
+        "sd_toggle": "" if data.registration.covariance is not None else "hidden",
     }
 
 
