@@ -29,8 +29,8 @@ SMOOTH_VOLUME = np.pi * HEIGHT * RADIUS**2 * (0.5 - 2 / np.pi**2)
 
 @pytest.fixture(scope="module")
 def torso():
-    """A small and a large smooth bump on a cylinder."""
-    return plate(32, lambda r: 1.3 * smooth(r), smooth, bend=3.0)
+    """A small and a large smooth bump on a bent chest."""
+    return plate(24, lambda r: 1.3 * smooth(r), smooth, bend=3.0)
 
 
 @pytest.fixture(scope="module")
@@ -39,29 +39,31 @@ def found(torso):
 
 
 def test_volume_of_a_spherical_cap_on_a_plane_converges_at_order_2():
-    """π h (3 a² + h²) / 6; the mesh is within h of it by its chords, the wall is the plane."""
+    """π h (3 a² + h²) / 6; a mesh of chords is inside of it by h², the wall is the plane."""
     errors = []
     for cells in (20, 40, 80):
         torso = plate(cells, cap(HEIGHT), cap(HEIGHT))
         patch = breast_patch(torso, "left")
-        wall = patch.wall_points(torso.points)
-        assert np.abs(wall[:, 1]).max() < 1e-12
         errors.append(float(volumes(patch, torso.points)) / cap_volume(HEIGHT) - 1)
     assert abs(errors[2]) < 5e-3, errors
     assert abs(errors[0]) / abs(errors[2]) > 12, errors
 
 
-def test_the_chest_wall_goes_on_as_the_chest_around_it():
-    """Behind a bump on a cylinder of 0.2 m radius lies the cylinder: 2 % of the volume at most.
+def test_the_chest_wall_is_the_soap_film_of_the_outline():
+    """A bump on the chest y = k x² / 2: its volume, and what is between the film and the chest.
 
-    The plane through the outline's mean would be π a⁴ / (8 R) = 25 ml, 25 %, off.
+    With s along the outline's tilted plane, c its cosine, the outline is an ellipse, on which the
+    film is A + B (s² - z²): B = k c² / (2 (1 + c²)), A = B a². Its integral less the chest's over
+    the disc is A π a² + B π a⁴ / 4 (1/c² - 1) - k π a⁴ / 8; k π a⁴ / 8 where the plane is not
+    tilted.
     """
-    torso = plate(60, smooth, smooth, bend=5.0)
-    patch = breast_patch(torso, "right")
-    assert float(volumes(patch, torso.points)) == pytest.approx(SMOOTH_VOLUME, rel=0.02)
-    wall = patch.wall_points(torso.points)
-    cylinder = 0.2 - np.sqrt(0.04 - wall[:, 0] ** 2)
-    assert np.abs(wall[:, 1] - cylinder).max() < 1e-3
+    k, a = 4.0, RADIUS
+    c2 = 1 / (1 + (0.08 * k) ** 2)
+    B = k * c2 / (2 * (1 + c2))
+    film = B * np.pi * a**4 + B * np.pi * a**4 / 4 * (1 / c2 - 1) - k * np.pi * a**4 / 8
+    torso = plate(60, smooth, smooth, bend=k)
+    found = float(volumes(breast_patch(torso, "right"), torso.points))
+    assert found == pytest.approx(SMOOTH_VOLUME + film, rel=4e-3)
 
 
 def test_a_mirrored_body_has_no_asymmetry():
@@ -114,14 +116,18 @@ def test_projection_is_the_height_over_the_chest():
     assert found.of("projection", "right").value == pytest.approx(20, rel=0.01)
 
 
-def test_the_way_along_a_cylinder_is_a_helix():
-    """The cylinder unrolls: the way from nipple to notch is the chord of the unrolled sheet."""
-    torso = plate(48, *[lambda r: 0 * r] * 2, bend=5.0)
+def test_the_way_along_a_bent_sheet_is_straight_when_unrolled():
+    """The sheet unrolls: the way from nipple to notch is the chord across the unrolled one.
+
+    The parabola y = k x² / 2 is x/2 √(1 + k² x²) + asinh(k x) / (2 k) long.
+    """
+    k, x = 5.0, 0.08
+    torso = plate(40, *[lambda r: 0 * r] * 2, bend=k)
     marks = torso.landmarks
     ways = Ways(torso.points, torso.triangles)
     way = ways.shortest(marks["nipple_left"], marks["sternal_notch"])
-    helix = np.hypot(np.arcsin(5.0 * 0.08) / 5.0, 0.1)
-    assert float(length(torso.points, torso.triangles, way)) == pytest.approx(helix, rel=2e-3)
+    chord = np.hypot(x / 2 * np.sqrt(1 + (k * x) ** 2) + np.arcsinh(k * x) / (2 * k), 0.1)
+    assert float(length(torso.points, torso.triangles, way)) == pytest.approx(chord, rel=1e-3)
     ends = way.at(torso.points, torso.triangles)[[0, -1]]
     expected = [torso.landmark_points()[name] for name in ("nipple_left", "sternal_notch")]
     assert np.abs(ends - expected).max() < 1e-12
@@ -166,12 +172,13 @@ def test_a_standard_deviation_is_the_blendshapes_times_its_slope(torso):
     found = measured(torso, rest, torso.points, covariance)
     assert found.of("volume", "left").sd == pytest.approx(0.5e6 * 1.3 * SMOOTH_VOLUME / 10, rel=0.02)
     assert found.of("volume", "right").sd == pytest.approx(0, abs=1e-9)
-    assert found.of("projection", "left").sd == pytest.approx(0.5e3 * 1.3 * HEIGHT / 10, rel=0.02)
+    ahead = 0.5e3 * 1.3 * HEIGHT / 10 / np.hypot(1, 3.0 * 0.08)  # across the chest's slope
+    assert found.of("projection", "left").sd == pytest.approx(ahead, rel=0.01)
     assert found.of("volume_difference").sd == pytest.approx(found.of("volume", "left").sd)
 
 
 def test_the_spread_is_that_of_random_postures(torso):
-    """2,000 postures drawn from the covariance, measured one by one: sds within 8 %."""
+    """1,000 postures drawn from the covariance, measured one by one: sds within 10 %."""
     rng = np.random.default_rng(5)
     unknowns = 9 * len(torso.bones) + 2
     root = rng.normal(size=(unknowns, unknowns)) * 3e-4
@@ -179,17 +186,17 @@ def test_the_spread_is_that_of_random_postures(torso):
     covariance = root @ root.T
     rest = Posture.rest(torso)
     found = measured(torso, rest, torso.points, covariance)
-    steps = rng.multivariate_normal(np.zeros(unknowns), covariance, size=2000)
+    steps = rng.multivariate_normal(np.zeros(unknowns), covariance, size=1000)
     at, _ = posed_many(torso, [rest.stepped(step) for step in steps])
     patch = breast_patch(torso, "left")
     drawn = 1e6 * volumes(patch, at)
-    assert drawn.std() == pytest.approx(found.of("volume", "left").sd, rel=0.08)
+    assert drawn.std() == pytest.approx(found.of("volume", "left").sd, rel=0.1)
     marks = torso.landmarks
     place = [np.einsum("c,scd->sd", marks[name].barycentric[0],
                        at[:, torso.triangles[marks[name].triangle[0]]])
              for name in ("nipple_left", "sternal_notch")]  # fmt: skip
     drawn = 1e3 * np.linalg.norm(place[0] - place[1], axis=1)
-    assert drawn.std() == pytest.approx(found.of("nipple_notch", "left").sd, rel=0.08)
+    assert drawn.std() == pytest.approx(found.of("nipple_notch", "left").sd, rel=0.1)
 
 
 def test_the_axes_of_a_covariance_sum_to_it():

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError, MeshError
-from supple.registration.breast_patch import SIDES, around, stretched
+from supple.registration.breast_patch import SIDES
+from supple.registration.chest_wall import around, stretched
 from supple.registration.outline import Cut, cut_along, cut_at
 from supple.registration.skin import vertex_normals
 from supple.surface import Surface
@@ -74,7 +75,7 @@ def closed(registration: Registration, settings: FrontSettings | None = None) ->
 def front(registration: Registration, settings: FrontSettings) -> Front:
     """The same with its parts.
 
-    The chest wall is that of `breast_patch`, here of both breasts and what is between them, moved
+    The chest wall goes on from the skin around the breasts (`chest_wall`), moved
     back by ``depth`` along its normals; a strip joins it to the rim of the skin.
     """
     template, vertices = registration.template, registration.points
