@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import MeshError
+from supple.registration.landmark_rules import level_with, xiphoid_height
 from supple.registration.template import OnSurface
 
 Floats = npt.NDArray[np.float64]
@@ -130,22 +131,26 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
 def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> dict[str, OnSurface]:
     """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight.
 
-    Nipple: the middle of what moves with the nipple's tip. Medial, lateral, inferior: the ends of
-    the breast's outline. Xiphoid: on the profile at the height of the lower folds.
+    Nipple: the middle of what moves with the nipple's tip. Medial, lateral: of the breast's outline
+    at the nipple's height; inferior: its lowest. Xiphoid: on the profile, 0.9 of the way down from
+    the notch to the folds.
     """
     around = skin.at(outline)
     tip = np.where(skin.points[:, 0] > 0, nipple, 0.0)
     tip = np.where(tip > 0.8 * tip.max(), tip, 0.0)
+    summit = tip @ skin.points / tip.sum()
+    medial, lateral = level_with(around, summit)
     marks = {
-        "nipple": skin.nearest(tip @ skin.points / tip.sum()),
+        "nipple": skin.nearest(summit),
         "axilla": skin.nearest(_axilla(skin, arm)),
-        "breast_medial": skin.nearest(around[around[:, 0].argmin()]),
-        "breast_lateral": skin.nearest(around[around[:, 0].argmax()]),
+        "breast_medial": skin.nearest(medial),
+        "breast_lateral": skin.nearest(lateral),
         "breast_inferior": skin.nearest(around[around[:, 2].argmin()]),
     }
-    fold = float(around[:, 2].min())
-    result = {"sternal_notch": skin.nearest(_notch(skin)),
-              "xiphoid": skin.nearest(skin.profile(fold, fold, 1))}  # fmt: skip
+    notch = _notch(skin)
+    end = xiphoid_height(float(notch[2]), float(around[:, 2].min()))
+    result = {"sternal_notch": skin.nearest(notch),
+              "xiphoid": skin.nearest(skin.profile(end, end, 1))}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from supple.registration.procedural_marks import marks, regions
 from supple.registration.procedural_mesh import skin
 from supple.registration.procedural_rig import bones, weights
-from supple.registration.procedural_shapes import BOUND, blendshapes
+from supple.registration.procedural_shapes import blendshapes, bounds
 from supple.registration.template import Template
 
 
@@ -34,7 +32,7 @@ def torso(spacing: float = 0.024) -> Template:
         weights=weights(made.points),
         blendshapes=shapes,
         blendshape_names=names,
-        blendshape_bounds=np.tile([-BOUND, BOUND], (len(names), 1)),
+        blendshape_bounds=bounds(names),
         landmarks=landmarks,
         curves=curves,
         regions=regions(made.points),

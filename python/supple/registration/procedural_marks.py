@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration import procedural_body as body
+from supple.registration.landmark_rules import level_with
 from supple.registration.procedural_mesh import Skin
 from supple.registration.procedural_rig import BASE, BASE_RADII, arm_part, breast_radius, left
 from supple.registration.template import CURVES, LANDMARKS, OnSurface
@@ -15,7 +16,8 @@ from supple.surface import Surface
 
 Floats = npt.NDArray[np.float64]
 
-NOTCH, XIPHOID = 0.140, -0.030  #: heights of the ends of the sternum, m
+#: Heights of the ends of the sternum, m: the lower is 0.9 of the way down to the breasts' folds.
+NOTCH, XIPHOID = 0.140, -0.049
 AXILLA = np.array([0.152, -0.012, 0.056])  #: near the left one, m
 _MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
 _MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
@@ -78,12 +80,14 @@ def _left_places() -> dict[str, Floats]:
     on_base = BASE + BASE_RADII * np.stack([np.cos(outline), np.sin(outline)], axis=1)
     start = body.BREAST + on_base @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
     line = body.met(start, -body.BREAST_AXES[2])
+    nipple = body.nipple()
+    medial, lateral = level_with(line, nipple)
     return {
-        "nipple_left": body.nipple()[None],
+        "nipple_left": nipple[None],
         "axilla_left": AXILLA[None],
-        "breast_medial_left": line[:1],
-        "breast_inferior_left": line[12:13],
-        "breast_lateral_left": line[24:25],
+        "breast_medial_left": medial[None],
+        "breast_inferior_left": line[[line[:, 2].argmin()]],
+        "breast_lateral_left": lateral[None],
         "breast_left": line,
     }
 

@@ -15,6 +15,14 @@ Floats = npt.NDArray[np.float64]
 
 #: Coefficients that still are a body; 1 is near one standard deviation among women.
 BOUND = 4.0
+#: Least and greatest coefficients of those that would fold the skin, or hollow a breast, earlier.
+_TIGHTER = {
+    "breast_size": (-2.5, 5.0),
+    "breast_projection": (-2.5, 5.0),
+    "axilla_front": (-4.0, 2.5),
+    "axilla_side": (-4.0, 2.5),
+    "arm_length": (-2.5, 4.0),
+}
 
 
 def blendshapes(skin: Skin) -> tuple[Floats, tuple[str, ...]]:
@@ -32,3 +40,9 @@ def blendshapes(skin: Skin) -> tuple[Floats, tuple[str, ...]]:
             fields.append((moved + image) / 2)
             names.append(name)
     return np.stack(fields), tuple(names)
+
+
+def bounds(names: tuple[str, ...]) -> Floats:
+    """Least and greatest coefficient (A, 2) of the blendshapes of these names."""
+    stems = [name.removesuffix("_left").removesuffix("_right") for name in names]
+    return np.array([_TIGHTER.get(stem, (-BOUND, BOUND)) for stem in stems])

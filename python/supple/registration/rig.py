@@ -192,6 +192,11 @@ class Rig:
         given = np.empty((0, 3)) if normals is None else np.asarray(normals, dtype=np.float64)
         self._fit.set_scan(scan.points, scan.triangles.astype(np.int32), given, voxel, thin)
 
+    @property
+    def cloud(self) -> Any:
+        """The thinned scan: ``points``, ``normals`` (c, 3); ``oriented``: their sign is known."""
+        return self._fit.scan
+
     def fit(
         self,
         start: Posture,
