@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..errors import InputError
 from ..files import METRES
 from ._run import Run, command
 
@@ -18,7 +19,7 @@ _FILE = click.Path(path_type=Path)
 
 
 @command
-@click.argument("scan", type=_FILE)
+@click.argument("scan", type=_FILE, required=False)
 @click.option("--template", type=_FILE, metavar="FILE.glb",
               help="Template; the default is the one that ships.")  # fmt: skip
 @click.option("--landmarks", type=_FILE, metavar="FILE",
@@ -26,13 +27,21 @@ _FILE = click.Path(path_type=Path)
 @click.option("--unit", type=click.Choice(list(METRES)), help="Of the scan; found from its size.")
 @click.option("--start", type=_FILE, metavar="parameters.json",
               help="Of the frame before: the fit starts from there.")  # fmt: skip
+@click.option("--study", is_flag=True, help="In place of a SCAN: redo the thesis' studies.")
+@click.option("--samples", type=click.IntRange(min=1), metavar="N",
+              help="Of --study: bodies a pose (default 3).")  # fmt: skip
+@click.option("--data", type=click.Path(path_type=Path, file_okay=False, exists=True),
+              help="Of --study: folder of template_makehuman.")  # fmt: skip
 def register(
     run: Run,
-    scan: Path,
+    scan: Path | None,
     template: Path | None,
     landmarks: Path | None,
     unit: str | None,
     start: Path | None,
+    study: bool,
+    samples: int | None,
+    data: Path | None,
 ) -> None:
     """Fit a torso to SCAN, in any pose, and carry the surgeon's drawing onto it.
 
@@ -41,7 +50,16 @@ def register(
     drawing.ply, .obj and .glb, landmarks.mrk.json and .fcsv, parameters.json, table.csv,
     picture.png, report.html and result.json to --out (default: out/ and the name of the scan).
     Exits with 3 where the fit is not to be trusted. Research use only.
+
+    --study draws the errors against landmarks given, blendshapes kept and each weight of the
+    energy (thesis, figures 9 to 13), on synthetic scans, to --out (default: out/register-study).
     """
+    if study:
+        _no_others("--study", scan, template, landmarks, unit, start)
+        return _study(run, samples or 3, data)
+    _no_others("a scan without --study", samples, data)
+    if scan is None:
+        raise InputError("SCAN is missing; give the file of a surface scan, or --study.")
     from ..registration.output import write
 
     run.out_or(Path("out") / scan.name.split(".")[0])
@@ -51,6 +69,21 @@ def register(
     run.progress("writing")
     write(outcome, run.path)
     tell(run, outcome)
+
+
+def _no_others(with_what: str, *given: object) -> None:
+    if any(value is not None for value in given):
+        raise InputError(f"{with_what} takes --samples and --data only together with --study, and "
+                         "then no scan; leave one out.")  # fmt: skip
+
+
+def _study(run: Run, samples: int, data: Path | None) -> None:
+    from ..studies import torso
+
+    run.out_or(Path("out") / "register-study")
+    written = torso.run(run.path("torso.csv").parent, samples, data, run.progress)
+    run.result["files"] = [path.name for path in written]
+    run.say(f"{samples} bodies a pose; figures and tables of {', '.join(torso.SWEEPS)}")
 
 
 def fitted(

@@ -129,9 +129,10 @@ def _drawing(axes: Any, portrait: Portrait) -> None:
         axes.plot(*off.T, color=PEN, linewidth=1.2, linestyle=":")
         axes.plot(*np.where(on[:, None], flat, np.nan).T, color=PEN, linewidth=2.6,
                   solid_capstyle="round")  # fmt: skip
-        if "arrow" in name and len(flat) > 4:
-            axes.annotate("", flat[-1], flat[-5],
-                          arrowprops={"arrowstyle": "-|>", "color": PEN, "lw": 2.6})  # fmt: skip
+        if "arrow" in name and len(flat) > 8:
+            axes.annotate("", flat[-1], flat[-8], arrowprops={
+                "arrowstyle": "-|>", "color": PEN, "mutation_scale": 26, "shrinkA": 0, "shrinkB": 0,
+                "lw": 0})  # fmt: skip
     for name, point in portrait.landmarks.items():
         at = _flat(point, portrait.frame)
         axes.plot(*at, "o", markersize=5, color=MARK, markeredgecolor="white", markeredgewidth=0.8)

@@ -104,7 +104,7 @@
   }
   function layout(look) {
     const size = box.hi.map((v, c) => v - box.lo[c]), tall = scene.clientHeight * 0.85,
-      zoom = Math.min(1.85 / size[2], (1.7 * scene.clientWidth) / tall / size[0]);
+      zoom = Math.min(1.7 / size[2], (1.6 * scene.clientWidth) / tall / size[0]);
     const axis = (c) => ({ range: [box.lo[c], box.hi[c]], visible: false });
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "#fff", uirevision: "keep",
       scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), camera: look, aspectmode: "manual",
