@@ -3,21 +3,20 @@
 1. words       report_words: headline, tables, all text escaped
 2. drawings    report_figures: clock face and sections through the tumour, SVG, also for print
 3. scene       report_scene: surfaces in three poses, packed, drawn by plotly.js in the page
-4. page        templates/report.{html,css,js}, filled and written aside
+4. page        templates/report.{html,js}, filled and written aside (supple.page)
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
-from string import Template
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supple.breast.result import Result, write_aside
+from supple.breast.result import Result
 from supple.errors import InputError
+from supple.page import write_page
 
 POSES = ("prone", "rest", "supine")
 
@@ -50,28 +49,18 @@ def write_report(path: str | Path, data: ReportData) -> None:
     Raises:
         InputError: a pose is missing, or arrays disagree in shape or are not finite.
     """
-    from plotly.offline import get_plotlyjs
-
     from supple.breast.report_figures import clock_face, section
     from supple.breast.report_scene import scene_json
     from supple.breast.report_words import words
 
     _check(data)
-    page = Template(_template("report.html")).substitute(
-        words(data),
-        style=_template("report.css"),
-        script=_template("report.js"),
-        plotly=get_plotlyjs().replace("</script", "<\\/script"),
-        scene=scene_json(data),
-        clock_face=clock_face(data),
-        axial=section(data, axis=2),
-        sagittal=section(data, axis=0),
-    )
-    write_aside(path, page)
-
-
-def _template(name: str) -> str:
-    return (resources.files("supple.breast") / "templates" / name).read_text(encoding="utf-8")
+    parts = words(data) | {
+        "scene": scene_json(data),
+        "clock_face": clock_face(data),
+        "axial": section(data, axis=2),
+        "sagittal": section(data, axis=0),
+    }
+    write_page(path, "supple.breast", "report", parts)
 
 
 def _check(data: ReportData) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.breast.result import closest_on_skin
+from supple.page import as_script, packed, thinned
 
 if TYPE_CHECKING:
     from supple.breast.report import ReportData
@@ -43,8 +42,8 @@ def scene_json(data: ReportData) -> str:
         scene["chest"] = _surface(still, data.chest, NODES["chest"])
     if data.scan is not None:
         scan = 1e3 * np.asarray(data.scan, dtype=float)
-        scene["scan"] = _pack(scan[:: max(1, -(-len(scan) // SCAN))], "<f4")
-    return json.dumps(scene, allow_nan=False).replace("<", "\\u003c")
+        scene["scan"] = packed(scan[:: max(1, -(-len(scan) // SCAN))], "<f4")
+    return as_script(scene)
 
 
 def most_movement(data: ReportData) -> float:
@@ -63,28 +62,10 @@ def _surface(
     nodes, rows = np.unique(tri, return_inverse=True)
     tri = rows.reshape(-1, 3)
     if len(nodes) > most:
-        keep, tri = _thin(poses["prone"][nodes], tri, most)
+        keep, tri = thinned(poses["prone"][nodes], tri, most)
         nodes = nodes[keep]
-    surface: dict[str, Any] = {pose: _pack(points[nodes], "<f4") for pose, points in poses.items()}
-    surface["triangles"] = _pack(tri, "<u4")
+    surface: dict[str, Any] = {pose: packed(points[nodes], "<f4") for pose, points in poses.items()}
+    surface["triangles"] = packed(tri, "<u4")
     if colour is not None:
-        surface["colour"] = _pack(colour[nodes], "<f4")
+        surface["colour"] = packed(colour[nodes], "<f4")
     return surface
-
-
-def _thin(points: Array, triangles: Triangles, most: int) -> tuple[Triangles, Triangles]:
-    """One node a voxel, the voxel as small as ``most`` allows; collapsed triangles go."""
-    size = 1.0
-    while True:
-        cell = np.floor(points / size).astype(np.int64)
-        _, first, to = np.unique(cell, axis=0, return_index=True, return_inverse=True)
-        if len(first) <= most:
-            break
-        size *= 1.15
-    tri = to.ravel()[triangles]
-    whole = (tri[:, 0] != tri[:, 1]) & (tri[:, 1] != tri[:, 2]) & (tri[:, 2] != tri[:, 0])
-    return first, tri[whole]
-
-
-def _pack(values: NDArray[Any], kind: str) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

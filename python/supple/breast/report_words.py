@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from supple.breast.report_scene import most_movement
 from supple.breast.result import NIPPLE_ESTIMATED
+from supple.page import bullets, rows
 
 if TYPE_CHECKING:
     from supple.breast.report import ReportData
@@ -35,11 +36,11 @@ def words(data: ReportData) -> dict[str, str]:
         "supine_mm": _coordinates(tumour.supine_mm),
         "verdict": _verdict(result),
         "error_bar": _error_bar(result),
-        "warnings": _warnings(result),
-        "assumed": _rows(_assumed(data)),
+        "warnings": bullets(result.warnings),
+        "assumed": rows(_assumed(data)),
         "checks": _checks(result),
-        "figures": _rows(_figures(result)),
-        "versions": _rows(list(result.versions.items())),
+        "figures": rows(_figures(result)),
+        "versions": rows(list(result.versions.items())),
         "ticks": "".join(f"<span>{v:g}</span>" for v in np.linspace(0, most_movement(data), 5)),
         "scan_toggle": "" if data.scan is not None else "hidden",
         "gland_toggle": "" if data.gland is not None else "hidden",
@@ -98,11 +99,6 @@ def _error_bar(result: Result) -> str:
     return " ".join(parts)
 
 
-def _warnings(result: Result) -> str:
-    items = "".join(f"<li>{escape(text)}</li>" for text in result.warnings)
-    return f"<ul>{items}</ul>" if items else "<p>None.</p>"
-
-
 def _assumed(data: ReportData) -> list[tuple[str, str]]:
     rows = list(data.assumptions.items())
     for name, parameter in data.result.parameters.items():
@@ -120,10 +116,6 @@ def _figures(result: Result) -> list[tuple[str, str]]:
         ("volume", f"{mesh.volume_ml:.0f} ml"),
     ]
     return rows + [(f"time, {name}", f"{value:.1f} s") for name, value in result.seconds.items()]
-
-
-def _rows(pairs: list[tuple[str, str]]) -> str:
-    return "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in pairs)
 
 
 def _checks(result: Result) -> str:
