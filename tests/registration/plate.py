@@ -1,4 +1,4 @@
-"""A template whose measures are known: two bumps on a chest that is a plane or a cylinder."""
+"""A template whose measures are known: two bumps on a chest that is a plane or a parabolic cylinder."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def plate(
 ) -> Template:
     """A sheet that faces the front, with ``cells`` squares along x, bumps, curvature ``bend`` 1/m.
 
-    The bend is that of a cylinder along z: y = R - sqrt(R² - x²). The two blendshapes add a tenth
+    The bend is that of a parabolic cylinder along z: y = bend x² / 2. The two blendshapes add a tenth
     of a bump's height each.
     """
     nx, nz = cells, round(cells * HEIGHT / WIDTH)
@@ -47,7 +47,7 @@ def plate(
         grid = np.where(near, centre + (grid - centre) * RADIUS / np.maximum(r, step), grid)
     bumps = [bump(np.hypot(*(grid - centre).T)) for bump, centre in
              zip((left or cap(), right or cap()), CENTRES, strict=True)]  # fmt: skip
-    chest = (1 - np.sqrt(1 - (bend * grid[:, 0]) ** 2)) / bend if bend else 0 * grid[:, 0]
+    chest = bend * grid[:, 0] ** 2 / 2
     points = np.column_stack([grid[:, 0], chest - sum(bumps), grid[:, 1]])
     names = np.arange(len(grid)).reshape(nx + 1, nz + 1)
     a, b, c, d = (names[i : i + nx, j : j + nz].ravel() for i, j in

@@ -76,8 +76,21 @@ def test_covariance_is_the_posterior_s():
     x = np.array([0.0, 1.0, 2.0])
     rows = np.column_stack([np.ones(3), x])
     data, prior = rows.T @ rows / 0.1**2, np.diag([0.0, 1 / 0.5**2])
-    expected = np.linalg.inv(rows.T @ rows / (4 * 0.1**2) + prior)
-    assert np.allclose(covariance(data, prior, 4.0), expected)
+    assert np.allclose(covariance(data, prior), np.linalg.inv(data + prior))
+
+
+@pytest.mark.parametrize("found", [0.05, 0.3])
+def test_covariance_is_that_of_many_fits_whose_noise_was_assumed_wrongly(found):
+    """20,000 lines with slopes from the prior and noise ``found``, all fitted as if it were 0.1."""
+    random = np.random.default_rng(0)
+    x = np.array([0.0, 1.0, 2.0])
+    rows = np.column_stack([np.ones(3), x])
+    data, prior = rows.T @ rows / 0.1**2, np.diag([1 / 2.0**2, 1 / 0.2**2])
+    truth = random.normal(size=(20_000, 2)) * (2.0, 0.2)
+    seen = truth @ rows.T + found * random.normal(size=(20_000, 3))
+    fitted = np.linalg.solve(data + prior, rows.T @ seen.T / 0.1**2).T
+    expected = np.cov((fitted - truth).T)
+    assert np.allclose(covariance(data, prior, (found / 0.1) ** 2), expected, rtol=0.05)
 
 
 def test_an_unknown_that_nothing_bounds_is_refused():

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from supple.breast.region import CUT
 from supple.breast.tissues import Tissue
+from supple.tetrahedra import connected
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -84,12 +84,6 @@ def facet_neighbours(facets: Ints) -> NDArray[np.intp]:
     ordered = np.sort(sides, axis=1)[order]
     same = (ordered[1:] == ordered[:-1]).all(axis=1)
     return np.stack([owner[order][:-1][same], owner[order][1:][same]], axis=1)
-
-
-def connected(pairs: NDArray[np.intp], count: int) -> NDArray[np.int32]:
-    """(count,) name of the connected part that each of `count` things belongs to."""
-    links = sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count))
-    return np.asarray(sparse.csgraph.connected_components(links, directed=False)[1], np.int32)
 
 
 def _without_specks(

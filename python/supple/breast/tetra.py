@@ -24,10 +24,11 @@ from supple.breast.facets import (
 from supple.breast.fidelity import cell_quality, fidelity
 from supple.breast.grid import voxel_coordinates
 from supple.breast.region import breast_region
-from supple.breast.remesh import cut_lattice, largest_parts, remesh
+from supple.breast.remesh import cut_lattice
 from supple.breast.surface import fit_to_level, signed_volumes, smooth_level
 from supple.breast.tissues import BREAST, Tissue
 from supple.errors import InputError, MeshError
+from supple.tetrahedra import largest_parts, remesh
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

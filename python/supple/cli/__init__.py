@@ -5,6 +5,8 @@ from __future__ import annotations
 from ._main import main
 
 #: Names of the commands; "rest-shape" is the object `rest_shape` of the file rest_shape.py.
-COMMANDS: tuple[str, ...] = ("demo", "predict", "solve", "rest-shape", "study", "materials")
+COMMANDS: tuple[str, ...] = (
+    "demo", "predict", "register", "template", "solve", "rest-shape", "study", "materials",
+)  # fmt: skip
 
 __all__ = ["COMMANDS", "main"]

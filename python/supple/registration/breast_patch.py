@@ -1,16 +1,17 @@
 """The breast on a template: the skin inside of its outline, and a chest wall stretched behind it.
 
     outline ─► signed distance of the vertices ─► triangles cut along its zero ─► skin of the breast
-    skin around the outline ─► thin plate ─► soap film from it to the outline ─► chest wall
+    outline ─► soap film over its plane ─► chest wall, closed with the skin at the outline
 
 Every point is a fixed weighted mean of the template's vertices, so that measures of a patch are
 smooth in the posture.
 
-The chest wall is not seen by a scan. Here it is the thin plate (Duchon 1977) that continues the
-skin around the breast behind it, over the outline's plane, plus the soap film (harmonic) that
-closes the gap along the outline. Without skin around, that is the minimal surface of the outline.
-Others put a Coons patch there (Choppin et al. 2013, doi 10.15221/13.012) or a statistical shape of
-the thorax (Göpper et al. 2020, doi 10.1371/journal.pone.0233586).
+The chest wall is not seen by a scan. Here it is the soap film of the outline, that is, the harmonic
+function over the outline's plane: the minimal surface where it is shallow. A chest that is curved
+there by 1 / R stands in front of it, so that a breast of base radius a is found π a⁴ / (8 R) too
+large; an outline drawn on the mound makes it too small. Others put a Coons patch there (Choppin et
+al. 2013, doi 10.15221/13.012, 30 % too large on prostheses) or a statistical shape of the thorax
+(Göpper et al. 2020, doi 10.1371/journal.pone.0233586).
 """
 
 from __future__ import annotations
@@ -21,17 +22,12 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration.outline import Cut, cut_along
-from supple.registration.skin import edges, vertex_normals
 from supple.registration.template import Template
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-#: Distance (m) from the outline of the skin that the chest wall continues: beyond the flank of
-#: the breast, not yet on the belly or the arm.
-AROUND = (12e-3, 45e-3)
-#: Of the thin plate: fewer points do not hold it, and how much of their noise it leaves out.
-_LEAST, _SMOOTHING = 12, 1e-4
+SIDES = ("left", "right")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,14 +37,12 @@ class BreastPatch:
     Attributes:
         side: "left" or "right".
         cut: the skin inside of the outline.
-        support: (s,) vertices of the template that hold the chest wall besides the outline.
-        wall: (i, b + s) what each inner point of the wall is made of: outline, then support.
+        wall: (i, b) what each inner point of the wall is made of: points of the outline.
         inner: (i,) points of the cut that are not on the outline.
     """
 
     side: str
     cut: Cut
-    support: Ints
     wall: Floats
     inner: Ints
 
@@ -59,9 +53,7 @@ class BreastPatch:
     def wall_points(self, vertices: Floats) -> Floats:
         """The chest wall (…, q, 3) m, point by point behind the skin, equal on the outline."""
         points = self.cut.at(vertices)
-        rim = points[..., self.cut.rim, :]
-        held = np.concatenate([rim, vertices[..., self.support, :]], axis=-2)
-        points[..., self.inner, :] = self.wall @ held
+        points[..., self.inner, :] = self.wall @ points[..., self.cut.rim, :]
         return points
 
 
@@ -72,17 +64,13 @@ def breast_patch(template: Template, side: str) -> BreastPatch:
         MeshError: the curve does not go once around that nipple.
     """
     cut = cut_along(template, f"breast_{side}", f"nipple_{side}")
+    inner = np.setdiff1d(np.arange(len(cut.corners)), cut.rim)
     at = cut.at(template.points)
     normal, centre = base_plane(at[cut.rim])
-    axes = _axes(normal)
-    support = _around(template, side, cut)
-    inner = np.setdiff1d(np.arange(len(at)), cut.rim)
-    film = _soap_film(cut, inner)
-    rim = (at[cut.rim] - centre) @ axes.T
-    around = (template.points[support] - centre) @ axes.T
-    plate = _thin_plate(around, np.vstack([rim, film @ rim]))
-    on_rim, behind = plate[: len(rim)], plate[len(rim) :]
-    return BreastPatch(side, cut, support, np.hstack([film, behind - film @ on_rim]), inner)
+    flat = np.zeros((len(at), 2))
+    flat[cut.rim] = (at[cut.rim] - centre) @ plane_axes(normal).T
+    flat[inner] = soap_film(cut, inner) @ flat[cut.rim]
+    return BreastPatch(side, cut, soap_film(cut, inner, flat), inner)
 
 
 def base_plane(rim: Floats) -> tuple[Floats, Floats]:
@@ -111,7 +99,7 @@ def _cone(points: Floats, triangles: Ints) -> Floats:
     return np.asarray(np.einsum("...td,...td->...", np.cross(a, b), c) / 6)
 
 
-def _axes(normal: Floats) -> Floats:
+def plane_axes(normal: Floats) -> Floats:
     """Two unit vectors (2, 3) across ``normal`` (3,)."""
     least = np.eye(3)[np.abs(normal).argmin()]
     u = np.cross(normal, least)
@@ -119,53 +107,31 @@ def _axes(normal: Floats) -> Floats:
     return np.stack([u, np.cross(normal, u)])
 
 
-def _around(template: Template, side: str, cut: Cut) -> Ints:
-    """Vertices beside the outline, of the trunk, that face as it does, outside of both breasts."""
-    near = (cut.distance > AROUND[0]) & (cut.distance < AROUND[1])
-    other = "left" if side == "right" else "right"
-    twin = cut_along(template, f"breast_{other}", f"nipple_{other}")
-    trunk = twin.distance > min(AROUND[0], 5e-3)
-    for part in ("arm_left", "arm_right", "neck"):
-        trunk &= ~template.regions[part]
-    normal, _ = base_plane(cut.at(template.points)[cut.rim])
-    facing = vertex_normals(template.points, template.triangles) @ normal > 0.3
-    return np.flatnonzero(near & trunk & facing)
+def soap_film(cut: Cut, inner: Ints, flat: Floats | None = None) -> Floats:
+    """Weights (i, b) of the rim that stretch a film over it.
 
-
-def _soap_film(cut: Cut, inner: Ints) -> Floats:
-    """Weights (i, b) that make each inner point the mean of its neighbours; Tutte (1963)."""
+    Without ``flat`` each inner point is the mean of its neighbours (Tutte 1963). With it, places
+    (q, 2) of all points in a plane, the film is harmonic there: the cotangent weights of Pinkall &
+    Polthier (1993), Experiment. Math. 2, 15–36.
+    """
     from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import spsolve
 
-    ends = np.unique(np.sort(edges(cut.triangles).reshape(-1, 2), axis=1), axis=0)
-    both, q = np.vstack([ends, ends[:, ::-1]]), len(cut.corners)
-    graph = coo_array((np.ones(len(both)), both.T), shape=(q, q)).tocsr()
+    q, (a, b, c) = len(cut.corners), cut.triangles.T
+    ends, weights = np.vstack([np.stack(pair, 1) for pair in ((a, b), (b, c), (c, a))]), None
+    if flat is None:
+        ends = np.unique(np.sort(ends, axis=1), axis=0)
+        weights = np.ones(len(ends))
+    else:
+        weights = np.concatenate([_cotangent(flat, *k) for k in ((a, b, c), (b, c, a), (c, a, b))])
+    rows, columns = np.vstack([ends, ends[:, ::-1]]).T
+    graph = coo_array((np.tile(weights, 2), (rows, columns)), shape=(q, q)).tocsr()
     laplacian = (diags_array(np.asarray(graph.sum(axis=1)).ravel()) - graph).tocsc()
     to_rim = -laplacian[inner][:, cut.rim].toarray()
     return np.asarray(spsolve(laplacian[inner][:, inner].tocsc(), to_rim)).reshape(to_rim.shape)
 
 
-def _thin_plate(held: Floats, wanted: Floats) -> Floats:
-    """Weights (w, h): values at ``wanted`` (w, 2) of a stiff thin plate near ``held`` (h, 2).
-
-    With too little skin to hold it, the plate is flat: weights 0, the soap film does the rest.
-    Source: Duchon (1977), Splines minimizing rotation-invariant semi-norms in Sobolev spaces;
-    smoothing as Wahba (1990), Spline models for observational data, eq. 2.4.9.
-    """
-    h = len(held)
-    if h < _LEAST:
-        return np.zeros((len(wanted), h))
-    size = np.ptp(held, axis=0).max()
-    held, wanted = held / size, wanted / size
-    system = np.zeros((h + 3, h + 3))
-    system[:h, :h] = _bend(held, held) + _SMOOTHING * h * np.eye(h)
-    system[:h, h:] = np.column_stack([np.ones(h), held])
-    system[h:, :h] = system[:h, h:].T
-    rows = np.column_stack([_bend(wanted, held), np.ones(len(wanted)), wanted])
-    return np.asarray(np.linalg.solve(system, rows.T)[:h].T)  # the system is symmetric
-
-
-def _bend(p: Floats, q: Floats) -> Floats:
-    """r² ln r² (p, q)."""
-    square = ((p[:, None] - q[None]) ** 2).sum(axis=2)
-    return np.asarray(square * np.log(np.where(square > 0, square, 1.0)))
+def _cotangent(flat: Floats, a: Ints, b: Ints, c: Ints) -> Floats:
+    """Of the angles (t,) at the corners c of flat triangles."""
+    u, v = flat[a] - flat[c], flat[b] - flat[c]
+    return np.asarray((u * v).sum(axis=1) / (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))

@@ -14,6 +14,8 @@ Ints = npt.NDArray[np.int64]
 
 #: Where an edge may be crossed, at first, as shares of it.
 _TRIED = (np.arange(5) + 0.5) / 5
+#: Most rounds of pulling taut; some ten are enough.
+_ROUNDS = 50
 
 
 class Ways:
@@ -102,20 +104,26 @@ def length(points: Floats, triangles: Ints, way: OnSurface) -> Floats:
 
 
 def _taut(a: Floats, ends: Floats, b: Floats) -> Floats:
-    """Shares (m,) of edges (m, 2, 3) at which the way a … b through them is shortest."""
-    from scipy.optimize import minimize
+    """Shares (m,) of edges (m, 2, 3) at which the way a … b through them is shortest.
 
-    if not len(ends):
-        return np.zeros(0)
-    along = ends[:, 1] - ends[:, 0]
+    Least squares of the steps, each weighted by 1 / its length: Weiszfeld's iteration.
+    """
+    from scipy.optimize import lsq_linear
 
-    def total(share: Floats) -> tuple[float, Floats]:
-        way = np.vstack([a, ends[:, 0] + share[:, None] * along, b])
-        steps = np.diff(way, axis=0)
-        far = np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-15)
-        turn = (steps / far)[:-1] - (steps / far)[1:]
-        return float(far.sum()), np.asarray(np.einsum("md,md->m", turn, along))
-
-    found = minimize(total, np.full(len(ends), 0.5), jac=True, method="L-BFGS-B",
-                     bounds=[(0, 1)] * len(ends), options={"ftol": 1e-15, "gtol": 1e-12})  # fmt: skip
-    return np.asarray(found.x)
+    m, along = len(ends), ends[:, 1] - ends[:, 0]
+    share = np.full(m, 0.5)
+    if not m:
+        return share
+    slope = np.zeros((m + 1, 3, m))  # of the steps, by the shares
+    k = np.arange(m)
+    slope[k, :, k], slope[k + 1, :, k] = along, -along
+    fixed = np.diff(np.vstack([a, ends[:, 0], b]), axis=0)
+    for _ in range(_ROUNDS):
+        far = np.linalg.norm(fixed + slope @ share, axis=1)
+        root = 1 / np.sqrt(np.maximum(far, 1e-6 * far.max()))[:, None]
+        rows = (slope * root[..., None]).reshape(-1, m)
+        before = share
+        share = lsq_linear(rows, -(fixed * root).ravel(), bounds=(0, 1)).x
+        if np.abs(share - before).max() < 1e-6:
+            break
+    return np.asarray(share)

@@ -80,10 +80,8 @@ def _glb(lines: Mapping[str, Carried]) -> bytes:
     whole.nodes[0].children = []
     for number, (name, line) in enumerate(lines.items()):
         blob += _add(whole, line, len(blob))
-        primitive = g.Primitive(
-            attributes=g.Attributes(POSITION=2 * number), indices=2 * number + 1, mode=1
-        )
-        whole.meshes.append(g.Mesh(name=name, primitives=[primitive]))
+        lone = g.Primitive(attributes=g.Attributes(POSITION=number), mode=1)
+        whole.meshes.append(g.Mesh(name=name, primitives=[lone]))
         whole.nodes.append(g.Node(name=name, mesh=number))
         whole.nodes[0].children.append(number + 1)
     whole.buffers.append(g.Buffer(byteLength=len(blob)))
@@ -92,23 +90,17 @@ def _glb(lines: Mapping[str, Carried]) -> bytes:
 
 
 def _add(whole: Any, line: Carried, start: int) -> bytes:
-    """Two views and accessors more: the points of a line and its edges; their bytes."""
+    """A view and an accessor more: both ends of each edge, one after the other; their bytes.
+
+    Without indices, since readers that take such lines for strips then draw the same.
+    """
     import pygltflib as g
 
-    points = (1e3 * line.points).astype("<f4")
-    pairs = np.array(_pairs(line), dtype="<u4")
-    views = ((points, g.ARRAY_BUFFER), (pairs, g.ELEMENT_ARRAY_BUFFER))
-    for array, target in views:
-        whole.bufferViews.append(
-            g.BufferView(buffer=0, byteOffset=start, byteLength=array.nbytes, target=target)
-        )
-        start += array.nbytes
-    view = len(whole.bufferViews)
-    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    whole.accessors += [
-        g.Accessor(bufferView=view - 2, componentType=g.FLOAT, count=len(points), type=g.VEC3,
-                   min=low, max=high),
-        g.Accessor(bufferView=view - 1, componentType=g.UNSIGNED_INT, count=pairs.size,
-                   type=g.SCALAR),
-    ]  # fmt: skip
-    return points.tobytes() + pairs.tobytes()
+    ends = (1e3 * line.points[np.array(_pairs(line)).ravel()]).astype("<f4")
+    whole.bufferViews.append(g.BufferView(buffer=0, byteOffset=start, byteLength=ends.nbytes,
+                                          target=g.ARRAY_BUFFER))  # fmt: skip
+    whole.accessors.append(g.Accessor(
+        bufferView=len(whole.bufferViews) - 1, componentType=g.FLOAT, count=len(ends), type=g.VEC3,
+        min=ends.min(axis=0).tolist(), max=ends.max(axis=0).tolist(),
+    ))  # fmt: skip
+    return ends.tobytes()

@@ -8,13 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import MeshError
+from supple.registration.landmark_rules import fold_below, level_with, xiphoid_height
 from supple.registration.template import OnSurface
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
-#: From the sternal notch straight to the tip of the xiphoid, m: 0.12 of her height.
-_STERNUM = 0.19
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,38 +131,30 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
 def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> dict[str, OnSurface]:
     """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight.
 
-    Nipple: the middle of what moves with the nipple's tip. Medial and lateral: the breast's
-    outline at the height of the nipple; inferior: its lowest point. Xiphoid: on the profile,
-    `_STERNUM` below the notch, as the base mesh shows no bone there.
+    Nipple: the middle of what moves with the nipple's tip. Medial, lateral: of the breast's outline
+    at the nipple's height; inferior: the fold below the nipple. Xiphoid: on the profile, 0.9 of the
+    way down from the notch to the folds.
     """
     around = skin.at(outline)
     tip = np.where(skin.points[:, 0] > 0, nipple, 0.0)
     tip = np.where(tip > 0.8 * tip.max(), tip, 0.0)
+    summit = tip @ skin.points / tip.sum()
+    medial, lateral = level_with(around, summit)
+    fold = fold_below(skin.points, skin.triangles, summit)
     marks = {
-        "nipple": skin.nearest(tip @ skin.points / tip.sum()),
+        "nipple": skin.nearest(summit),
         "axilla": skin.nearest(_axilla(skin, arm)),
-        "breast_inferior": skin.nearest(around[around[:, 2].argmin()]),
+        "breast_medial": skin.nearest(medial),
+        "breast_lateral": skin.nearest(lateral),
+        "breast_inferior": skin.nearest(fold),
     }
-    level = float(skin.at(marks["nipple"])[0, 2])
-    ends = _level(around, level)
-    marks["breast_medial"] = skin.nearest(ends[ends[:, 0].argmin()])
-    marks["breast_lateral"] = skin.nearest(ends[ends[:, 0].argmax()])
-    notch = _notch(skin, level)
-    line = skin.profile(notch[2] - _STERNUM, notch[2], 2000)
-    far = np.linalg.norm(line - notch, axis=1)
+    notch = _notch(skin, float(skin.at(marks["nipple"])[0, 2]))
+    end = xiphoid_height(float(notch[2]), float(fold[2]))
     result = {"sternal_notch": skin.nearest(notch),
-              "xiphoid": skin.nearest(line[np.argmin(np.abs(far - _STERNUM))])}  # fmt: skip
+              "xiphoid": skin.nearest(skin.profile(end, end, 1))}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
-
-
-def _level(line: Floats, height: float) -> Floats:
-    """Where a closed line (k, 3) m crosses a height, (m, 3) m."""
-    a, b = line, np.roll(line, -1, axis=0)
-    crossing = (a[:, 2] < height) != (b[:, 2] < height)
-    a, b = a[crossing], b[crossing]
-    return np.asarray(a + (b - a) * ((height - a[:, 2]) / (b - a)[:, 2])[:, None])
 
 
 def _notch(skin: Skin, below: float) -> Floats:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from supple.registration.breast_patch import BreastPatch, base_plane, breast_patch, volumes
 from supple.registration.geodesic import Ways, length
 from supple.registration.mirrored import Mirrored
-from supple.registration.posture import Posture
+from supple.registration.posture import Posture, posed
 from supple.registration.template import OnSurface, Template
 
 if TYPE_CHECKING:
@@ -113,7 +113,8 @@ def measured(
     value = ask(points[None], posture.rotations[None, chest])[0]
     sd = [None] * len(value)
     if covariance is not None:
-        sd = deviations(lambda at, rotations: ask(at, rotations[:, chest]),
+        beyond = points - posed(template, posture)  # what bones and blendshapes do not reach
+        sd = deviations(lambda at, rotations: ask(at + beyond, rotations[:, chest]),
                         template, posture, covariance).tolist()  # fmt: skip
     names = [(name, side, *of) for side in SIDES for name, of in OF_A_BREAST.items()]
     names += [(name, "", *of) for name, of in OF_BOTH.items()]

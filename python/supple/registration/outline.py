@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -46,13 +47,22 @@ class Cut:
         return np.asarray(a + self.share[:, None] * (b - a))
 
 
+@lru_cache(maxsize=16)
 def cut_along(template: Template, curve: str, inside: str) -> Cut:
     """The skin inside of ``curve``, where the landmark ``inside`` is.
 
     Raises:
         MeshError: the curve does not go once around the landmark, on one sheet of skin.
     """
-    distance = signed_distance(template, curve, inside)
+    return cut_at(template, signed_distance(template, curve, inside), f"the curve {curve!r}")
+
+
+def cut_at(template: Template, distance: Floats, curve: str) -> Cut:
+    """The skin where ``distance`` (n,) is negative, cut along its zero.
+
+    Raises:
+        MeshError: it is not one disc; ``curve`` is what its rim is called then.
+    """
     corners, share, loops = _clipped(template.triangles, distance)
     whole = Cut(corners, share, np.empty((0, 3), dtype=np.int64), np.empty(0, np.int64), distance)
     triangles = _split(loops, whole.at(template.points))
@@ -159,4 +169,4 @@ def _loop(triangles: Ints, curve: str) -> Ints:
             loop.append(after[loop[-1]])
         if len(loop) == len(rim) and len(after) == len(rim):
             return np.array(loop)
-    raise MeshError(f"the curve {curve!r} must go once around one sheet of skin; draw it again.")
+    raise MeshError(f"{curve} must go once around one sheet of skin; draw it again.")

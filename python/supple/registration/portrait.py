@@ -79,6 +79,13 @@ def draw_portrait(path: str | Path, portrait: Portrait) -> Path:
     return file
 
 
+def skin_colours() -> Any:
+    """Colour map of lit skin, from shade (0) to light (1)."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("skin", _SKIN)
+
+
 def _flat(points: Floats, frame: Floats) -> Floats:
     """Across and up (…, 2), mm."""
     return np.asarray(1e3 * points @ frame[[0, 2]].T)
@@ -91,11 +98,9 @@ def _box(portrait: Portrait) -> tuple[Floats, Floats]:
 
 def _scan(axes: Any, portrait: Portrait, low: Floats, high: Floats) -> None:
     """What faces the front within the box, from back to front, lit from above and one side."""
-    from matplotlib.colors import LinearSegmentedColormap
-
     scan, frame = portrait.scan, portrait.frame
     flat, depth = _flat(scan.points, frame), scan.points @ frame[1]
-    colours = LinearSegmentedColormap.from_list("skin", _SKIN)
+    colours = skin_colours()
     inside = ((flat > low) & (flat < high)).all(axis=1)
     if not len(scan.triangles):
         shown = np.flatnonzero(inside)
@@ -124,9 +129,10 @@ def _drawing(axes: Any, portrait: Portrait) -> None:
         axes.plot(*off.T, color=PEN, linewidth=1.2, linestyle=":")
         axes.plot(*np.where(on[:, None], flat, np.nan).T, color=PEN, linewidth=2.6,
                   solid_capstyle="round")  # fmt: skip
-        if "arrow" in name and len(flat) > 4:
-            axes.annotate("", flat[-1], flat[-5],
-                          arrowprops={"arrowstyle": "-|>", "color": PEN, "lw": 2.6})  # fmt: skip
+        if "arrow" in name and len(flat) > 8:
+            axes.annotate("", flat[-1], flat[-8], arrowprops={
+                "arrowstyle": "-|>", "color": PEN, "mutation_scale": 26, "shrinkA": 0, "shrinkB": 0,
+                "lw": 0})  # fmt: skip
     for name, point in portrait.landmarks.items():
         at = _flat(point, portrait.frame)
         axes.plot(*at, "o", markersize=5, color=MARK, markeredgecolor="white", markeredgewidth=0.8)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration import procedural_body as body
+from supple.registration.landmark_rules import fold_below, level_with
 from supple.registration.procedural_mesh import Skin
 from supple.registration.procedural_rig import BASE, BASE_RADII, arm_part, breast_radius, left
 from supple.registration.template import CURVES, LANDMARKS, OnSurface
@@ -15,7 +16,8 @@ from supple.surface import Surface
 
 Floats = npt.NDArray[np.float64]
 
-NOTCH, XIPHOID = 0.140, -0.030  #: heights of the ends of the sternum, m
+#: Heights of the ends of the sternum, m: the lower is 0.9 of the way down to the breasts' folds.
+NOTCH, XIPHOID = 0.140, -0.060
 AXILLA = (0.156, 0.054)  #: x and z of the left one, m: where arm and chest part in front
 _MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
 _MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
@@ -26,7 +28,8 @@ def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
     found = {name: _on_midline(skin, np.array([z])) for name, z in _MIDDLE.items()}
     found |= {"sternum_arrow_upper": _arrow(skin, NOTCH - 0.004, _MEET + 0.010),
               "sternum_arrow_lower": _arrow(skin, XIPHOID + 0.004, _MEET - 0.010)}  # fmt: skip
-    for name, points in _left_places().items():
+    fold = fold_below(skin.points, skin.triangles, body.nipple())
+    for name, points in {**_left_places(), "breast_inferior_left": fold[None]}.items():
         found[name] = _nearest(skin, points, closed=name == "breast_left")
         found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
     return {name: found[name] for name in LANDMARKS}, {name: found[name] for name in CURVES}
@@ -78,14 +81,15 @@ def _left_places() -> dict[str, Floats]:
     on_base = BASE + BASE_RADII * np.stack([np.cos(outline), np.sin(outline)], axis=1)
     start = body.BREAST + on_base @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
     line = body.met(start, -body.BREAST_AXES[2])
+    nipple = body.nipple()
+    medial, lateral = level_with(line, nipple)
     return {
-        "nipple_left": body.nipple()[None],
+        "nipple_left": nipple[None],
         "axilla_left": body.met(
             np.array([[AXILLA[0], -0.2, AXILLA[1]]]), np.array([0.0, 1.0, 0.0])
         ),
-        "breast_medial_left": line[:1],
-        "breast_inferior_left": line[12:13],
-        "breast_lateral_left": line[24:25],
+        "breast_medial_left": medial[None],
+        "breast_lateral_left": lateral[None],
         "breast_left": line,
     }
 

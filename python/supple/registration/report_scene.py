@@ -26,7 +26,7 @@ def scene(data: ReportData) -> dict[str, str]:
         "skin": {
             "points": packed(_upright(data, r.points), "<f4"),
             "triangles": packed(r.template.triangles, "<u4"),
-            "values": None if r.sd is None else packed(1e3 * r.sd, "<f4"),
+            "values": None if r.covariance is None else packed(1e3 * r.sd, "<f4"),
         },
         "curves": [
             {"name": _plain(name), "closed": c.closed, "arrow": "arrow" in name,
@@ -38,7 +38,7 @@ def scene(data: ReportData) -> dict[str, str]:
              "on": bool(c.on_scan[0]), "given": name in data.given}
             for name, c in data.landmarks.items()
         ],
-        "most": {"sd": _most(None if r.sd is None else 1e3 * r.sd),
+        "most": {"sd": _most(None if r.covariance is None else 1e3 * r.sd),
                  "distance": _most(1e3 * np.abs(r.distance[r.used]))},
     }  # fmt: skip
     return {"scene": as_script(whole)}

@@ -33,7 +33,7 @@ def words(data: ReportData) -> dict[str, str]:
         "said": bullets(data.said),
         "meanings": rows((_plain(k), v[1]) for k, v in (OF_A_BREAST | OF_BOTH).items()),
         "versions": rows(data.versions.items()),
-        "sd_toggle": "" if data.registration.sd is not None else "hidden",
+        "sd_toggle": "" if data.registration.covariance is not None else "hidden",
     }
 
 
@@ -61,9 +61,9 @@ def _on_scan(data: ReportData) -> str:
 
 def _sides(data: ReportData) -> str:
     of = data.measures.of
-    lines = [(f"{_plain(name)} ({unit})", _with_sd(of(name, "left")), _with_sd(of(name, "right")))
+    lines = [(f"{_plain(name)} ({unit})", _with_sd(of(name, "right")), _with_sd(of(name, "left")))
              for name, (unit, _) in OF_A_BREAST.items()]  # fmt: skip
-    return rows([*lines, ("grade of ptosis", *(data.measures.ptosis[s] for s in ("left", "right")))])
+    return rows([*lines, ("grade of ptosis", *(data.measures.ptosis[s] for s in ("right", "left")))])
 
 
 def _both(data: ReportData) -> str:

@@ -32,7 +32,7 @@ REACH = 10e-3
 #: Over a hole, the closest point is on its rim, this far (m) or farther to the side.
 RIM = 2e-3
 #: Least cosine between the normals of skin and scan, the scan's smoothed so many times.
-FACING, _SMOOTHED = 0.3, 3
+FACING, _SMOOTHED = 0.2, 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,6 +9,7 @@ the scan lacks is as uncertain as bodies differ.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +18,15 @@ from supple.errors import InputError
 from supple.registration.posture import Posture
 from supple.registration.template import Floats, OnSurface, Template
 
+if TYPE_CHECKING:
+    from supple.registration.rig import RigFit
+
 #: Residuals are compared over distances up to this, m, in rings as wide as that.
 _FAR, _RING = 0.12, 0.01
-#: Points whose residuals are compared with all others'.
-_ANCHORS = 400
+#: Points whose residuals are compared, with so many others.
+_ANCHORS, _OTHERS = 200, 4000
+#: Robust weight below which a point was left out.
+_USED = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,23 +44,44 @@ class Bands:
     radius95: Floats
 
 
+def of_fit(found: RigFit, template: Template, patch: float = 15e-3) -> Floats:
+    """Covariance (9K+A, 9K+A) of the unknowns of a fit, with its own residuals as the noise."""
+    used = found.used > _USED
+    corners = found.points[template.triangles[found.triangle[used]]]
+    landing = np.einsum("kc,kcd->kd", found.barycentric[used], corners)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-300
+    points = found.scan_points[used]
+    residuals = np.einsum("kd,kd->k", points - landing, normal)
+    spent = np.trace(np.linalg.solve(found.data_matrix + found.prior_matrix, found.data_matrix))
+    free = 1 - float(spent) / max(found.observations, 1.0)
+    return covariance(found.data_matrix, found.prior_matrix,
+                      inflation(points, residuals, patch, found.noise, free))  # fmt: skip
+
+
 def covariance(data_matrix: Floats, prior_matrix: Floats, inflation: float = 1.0) -> Floats:
-    """Of the unknowns (p, p): inverse of the energy's second derivative at the fit.
+    """Of the unknowns (p, p) that minimise the energy: H⁻¹ (f D + P) H⁻¹ with H = D + P.
+
+    The fit weighed data D against prior P by an assumed variance of the data; that it was f times
+    as large does not change where the minimum is, but how far that is from the truth. With f = 1
+    this is H⁻¹.
 
     Args:
-        data_matrix: (p, p) of the data, in units of their assumed variance.
-        prior_matrix: (p, p) of all other terms.
-        inflation: what the data's variance is, in units of the assumed one.
+        data_matrix: D (p, p), in units of the assumed variance.
+        prior_matrix: P (p, p) of all other terms.
+        inflation: f.
 
     Raises:
         InputError: the matrices differ in size, or neither data nor prior bounds an unknown.
+
+    Source: White (1982), Econometrica 50(1), theorem 3.2, the prior counted as data.
     """
     if data_matrix.shape != prior_matrix.shape:
         raise InputError(
             f"data_matrix and prior_matrix must be of one size, got {data_matrix.shape} and "
             f"{prior_matrix.shape}."
         )
-    whole = data_matrix / inflation + prior_matrix
+    whole = data_matrix + prior_matrix
     scale = 1 / np.sqrt(np.maximum(np.diagonal(whole), 1e-300))
     try:
         root = np.linalg.inv(np.linalg.cholesky(whole * scale[:, None] * scale))
@@ -62,7 +89,8 @@ def covariance(data_matrix: Floats, prior_matrix: Floats, inflation: float = 1.0
         raise InputError(
             "the data and the prior leave an unknown free; give the posture a prior."
         ) from None
-    return np.asarray((root.T @ root) * scale[:, None] * scale)
+    inverse = (root.T @ root) * scale[:, None] * scale
+    return np.asarray(inverse @ (inflation * data_matrix + prior_matrix) @ inverse)
 
 
 def inflation(points: Floats, residuals: Floats, patch: float, assumed: float,
@@ -102,6 +130,8 @@ class Correlogram:
 
 def correlated(points: Floats, residuals: Floats) -> Correlogram:
     """Up to the first ring in which residuals no longer agree, at most 12 cm."""
+    every = -(-len(points) // _OTHERS)
+    points, residuals = points[::every], residuals[::every]
     anchors = np.unique(np.linspace(0, len(points) - 1, _ANCHORS).astype(np.int64))
     apart = _distances(points[anchors], points)
     rings = round(_FAR / _RING)
@@ -114,7 +144,7 @@ def correlated(points: Floats, residuals: Floats) -> Correlogram:
     edges = _RING * np.arange(rings + 1)
     areas: Floats = np.pi * np.diff(edges**2)
     per_area = count[1:6].sum() / len(anchors) / areas[1:6].sum()  # points a m² of skin
-    own = 1 / max(per_area, 1.0)
+    own = 1 / max(every * per_area, 1.0)
     areas[0] = max(areas[0] - own, 0.0)
     until = int(np.argmax(np.append(mean, -1.0) <= 0))
     middles: Floats = _RING * (0.5 + np.arange(until, dtype=np.float64))

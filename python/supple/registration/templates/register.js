@@ -20,7 +20,7 @@
   const layer = (name) => document.querySelector('[data-layer="' + name + '"]');
   const ramp = [[0, "#f7e8da"], [0.25, "#bfdccb"], [0.5, "#74b3bd"], [0.75, "#3b7ba6"], [1, "#26407a"]];
   const light = { ambient: 0.5, diffuse: 0.65, specular: 0.1, roughness: 0.8, fresnel: 0.1 };
-  const lamp = { x: 6e4, y: -9e4, z: 1e5 };
+  const lamp = { x: 6e4, y: 9e4, z: -1e5 }; // as plotly.js turns it: from the front, above
 
   function surface(name, plain, mode) {
     const own = data[name], [x, y, z] = columns(floats(own.points));
@@ -71,7 +71,7 @@
     const x = [], y = [], z = [], text = ["R", "L", "A", "P", "I", "S"];
     text.forEach((_, n) => {
       const p = middle.slice(), c = n >> 1;
-      if (c === 1) { p[0] = box.hi[0] - 6; p[2] = box.lo[2] + 6; }
+      if (c === 1) { p[0] = box.hi[0] - (n % 2 ? 6 : 28); p[2] = box.lo[2] + 6; }
       p[c] = n % 2 ? box.hi[c] - 6 : box.lo[c] + 6;
       x.push(p[0]); y.push(p[1]); z.push(p[2]);
     });
@@ -84,7 +84,7 @@
       x.push(at[0], at[0] + d[0], null); y.push(at[1], at[1] + d[1], null); z.push(at[2], at[2] + d[2], null);
     });
     return [{ type: "scatter3d", mode: "lines", x, y, z, line: { color: "#14232e", width: 5 }, hoverinfo: "skip" },
-      { type: "scatter3d", mode: "text", x: [at[0] + 25], y: [at[1]], z: [at[2] - 9], text: ["50 mm"],
+      { type: "scatter3d", mode: "text", x: [at[0] + 30], y: [at[1]], z: [at[2] + 9], text: ["50 mm"],
         textfont: { size: 12, color: "#14232e" }, hoverinfo: "skip" }];
   }
 
@@ -104,7 +104,7 @@
   }
   function layout(look) {
     const size = box.hi.map((v, c) => v - box.lo[c]), tall = scene.clientHeight * 0.85,
-      zoom = Math.min(1.65 / size[2], (1.5 * scene.clientWidth) / tall / size[0]);
+      zoom = Math.min(1.7 / size[2], (1.6 * scene.clientWidth) / tall / size[0]);
     const axis = (c) => ({ range: [box.lo[c], box.hi[c]], visible: false });
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "#fff", uirevision: "keep",
       scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), camera: look, aspectmode: "manual",

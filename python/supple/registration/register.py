@@ -1,0 +1,227 @@
+"""Registering a torso template to a scan, in any pose.
+
+1. scan       thinned, with normals
+2. start      given, from landmarks, or searched: all rotations, arms down or up
+3. coarse     rigid, bones, scales; of the rival starts the best goes on
+4. fine       all shapes, the robust threshold shrinking to the noise
+5. offset     where asked for: what bones and shapes cannot reach, smoothly
+6. judge      is the fit to be trusted, and if not, why
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from supple.errors import InputError
+from supple.registration.body_prior import body_prior
+from supple.registration.initial_pose import Candidate, SearchSettings, candidates
+from supple.registration.landmark_pose import posture_from_landmarks
+from supple.registration.offset import Offset, OffsetSettings, offset
+from supple.registration.posture import Posture
+from supple.registration.registration import Registration
+from supple.registration.rig import Priors, Rig, RigFit, Stage
+from supple.registration.scan_pieces import main_pieces
+from supple.registration.template import Floats, Template
+from supple.registration.trust import Doubts, doubts
+from supple.registration.weights import Weights
+from supple.surface import Surface
+
+#: From a start that is a few cm off: bones first.
+COARSE = (
+    Stage("rigid", 5, 2e-3, 0.12, 0.06, 75.0, 0.3, 0.05, 4, 8),
+    Stage("bones", 8, 2e-3, 0.10, 0.04, 75.0, 0.3, 0.03, 4, 8),
+    Stage("scales", 6, 1e-3, 0.08, 0.025, 70.0, 0.3, 0.02, 3, 6),
+)  # fmt: skip
+#: All shapes, down to the noise.
+FINE = (
+    Stage("all", 8, 5e-4, 0.05, 0.015, 60.0, 0.3, 0.01, 2, 3),
+    Stage("all", 8, 1e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 1, 1),
+)
+#: The next frame of a moving scan.
+WARM = (
+    Stage("all", 2, 1e-3, 0.05, 0.02, 60.0, 0.3, 0.01, 3, 6),
+    Stage("all", 2, 2e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 2, 3),
+)
+
+
+@dataclass(frozen=True)
+class RegisterSettings:
+    """How a scan is registered; lengths in m."""
+
+    weights: Weights = Weights()
+    priors: Priors | None = None  #: how bodies differ; `body_prior` of the template
+    coarse: tuple[Stage, ...] = COARSE
+    fine: tuple[Stage, ...] = FINE
+    warm: tuple[Stage, ...] = WARM
+    search: SearchSettings = SearchSettings()
+    voxel: float = 10e-3  #: the scan is thinned to one point a voxel
+    landmark_sd: float = 5e-3  #: of landmarks that are given
+    starts: int = 3  #: rival starts that are tried, at most
+    rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
+    doubts: Doubts = Doubts()
+    offset: OffsetSettings | None = OffsetSettings()  #: None: bones and shapes alone
+
+
+def register(
+    scan: Surface,
+    template: Template | None = None,
+    landmarks: Mapping[str, npt.ArrayLike] | None = None,
+    settings: RegisterSettings | None = None,
+    start: Posture | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Registration:
+    """Fit ``template`` to ``scan``.
+
+    Args:
+        scan: m, in any frame; triangles, or a cloud of points. More than the torso does no harm.
+        template: the shipped one by default.
+        landmarks: name → (3,) m on the scan; they pull with ``settings.landmark_sd``, and three
+            or more give the initial pose.
+        start: a posture near the answer (the frame before): no search.
+        progress: called with the name of each stage.
+
+    Returns:
+        The registration. Read ``trustworthy`` and ``warnings`` before using it.
+
+    Raises:
+        InputError: landmarks that the template does not name, a scan that is no body in metres.
+        ConvergenceError: nothing of the template comes near the scan.
+    """
+    keep, clock = settings or RegisterSettings(), _Clock(progress)
+    if template is None:
+        from supple.registration.procedural import torso
+
+        template = torso()
+    clock.stage("scan")
+    _check(scan)
+    named = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
+    rig = rig_of(template)
+    _set_scan(rig, scan, keep)
+    if keep.priors is None:
+        keep = replace(keep, priors=body_prior(template))
+    clock.stage("start")
+    starts = _starts(rig, named, keep, start)
+    clock.stage("coarse")
+    tried = [] if start is not None else _coarse(rig, starts, named, keep)
+    clock.stage("fine")
+    first = tried[0].posture if tried else starts[0].posture
+    stages = keep.fine if tried else keep.warm
+    fit = _run(rig, first, stages, named, keep)
+    clock.stage("offset")
+    moved = _offset(rig, fit, keep)
+    clock.stage("judge")
+    return _result(rig, scan, fit, moved, tried, starts, keep, clock)
+
+
+_RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
+
+
+def rig_of(template: Template) -> Rig:
+    """The template in the core, made once."""
+    if template not in _RIGS:
+        _RIGS[template] = Rig(template)
+    return _RIGS[template]
+
+
+class _Clock:
+    """Seconds of each stage."""
+
+    def __init__(self, progress: Callable[[str], None] | None) -> None:
+        self.progress, self.name = progress, ""
+        self.begun = self.since = time.perf_counter()
+        self.seconds: dict[str, float] = {}
+
+    def stage(self, name: str) -> None:
+        now = time.perf_counter()
+        if self.name:
+            self.seconds[self.name] = now - self.since
+        self.name, self.since = name, now
+        if self.progress is not None and name:
+            self.progress(name)
+
+    def stop(self) -> dict[str, float]:
+        self.stage("")
+        return self.seconds | {"total": time.perf_counter() - self.begun}
+
+
+def _check(scan: Surface) -> None:
+    size = scan.size
+    if len(scan.points) < 200:
+        raise InputError(f"scan must be 200 points or more, got {len(scan.points)}; "
+                         "give the whole scan.")  # fmt: skip
+    if not 0.1 <= size <= 4.0:
+        raise InputError(f"scan must span 0.1 to 4 m, got {size:.4g} m; convert it to metres.")
+
+
+def _set_scan(rig: Rig, scan: Surface, keep: RegisterSettings) -> None:
+    """Thinned, and without the small pieces beside the body."""
+    rig.set_scan(scan, voxel=keep.voxel)
+    cloud = rig.cloud
+    points, normals = np.asarray(cloud.points), np.asarray(cloud.normals)
+    body = main_pieces(points, 1.9 * keep.voxel)
+    if not body.all():
+        given = normals[body] if cloud.oriented else None
+        rig.set_scan(Surface(points[body]), given, thin=False)
+
+
+def _starts(
+    rig: Rig, named: Mapping[str, Floats], keep: RegisterSettings, start: Posture | None
+) -> list[Candidate]:
+    if start is not None:
+        return [Candidate(start, "given", 0.0)]
+    if len(named) >= 3:
+        found = posture_from_landmarks(rig.template, named)
+        if found:
+            return found
+    cloud = rig.cloud
+    return candidates(cloud.points, cloud.normals, rig.template, cloud.oriented, keep.search)
+
+
+def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str, Floats],
+         keep: RegisterSettings) -> RigFit:  # fmt: skip
+    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd)
+
+
+def _coarse(rig: Rig, starts: list[Candidate], named: Mapping[str, Floats],
+            keep: RegisterSettings) -> list[RigFit]:  # fmt: skip
+    """Coarse fits of the starts that are nearly as good as the best, best first."""
+    near = [one for one in starts if one.score <= keep.rival * starts[0].score][: keep.starts]
+    fits = [_run(rig, one.posture, keep.coarse, named, keep) for one in near]
+    return sorted(fits, key=lambda fit: coarse_score(fit, keep.coarse[-1].reach))
+
+
+def coarse_score(fit: RigFit, reach: float) -> float:
+    """Mean distance, m, of the thinned scan to the skin, where no partner counts as ``reach``."""
+    return float(np.where(np.isfinite(fit.distance), fit.distance, reach).mean())
+
+
+def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
+    if keep.offset is None:
+        return Offset(np.zeros_like(fit.points), None, 0.0)
+    cloud = rig.cloud
+    return offset(
+        fit, rig.template.triangles, fit.scan_points, fit.scan_normals, cloud.oriented, keep.offset
+    )
+
+
+def _result(rig: Rig, scan: Surface, fit: RigFit, moved: Offset, tried: list[RigFit],
+            starts: list[Candidate], keep: RegisterSettings, clock: _Clock) -> Registration:  # fmt: skip
+    covariance = fit.covariance()
+    warnings = doubts(rig, fit, tried, starts, covariance, keep.doubts)
+    history = [value for one in [*tried[:1], fit] for value in one.history]
+    return Registration(
+        rig.template, fit.posture, fit.points + moved.vectors, scan, moved.vectors,
+        moved.precision, covariance, not warnings, warnings, clock.stop(), len(history), history,
+        _reach(fit), fit,
+    )  # fmt: skip
+
+
+def _reach(fit: RigFit) -> float:
+    """Distance, m, beyond which scan points are clutter."""
+    return float(np.clip(6 * fit.residual_sd, 8e-3, 25e-3))

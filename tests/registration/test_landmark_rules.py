@@ -1,0 +1,42 @@
+"""The landmarks of all templates mean the same points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from supple.registration.landmark_rules import level_with
+from supple.registration.makehuman import torso as makehuman
+from supple.registration.procedural import torso as procedural
+
+
+@pytest.mark.parametrize("name", ["procedural", "makehuman"])
+def test_a_template_s_landmarks_are_where_the_rules_put_them(name, request):
+    """Xiphoid: 0.9 of the way down from notch to folds; the breast's sides: at the nipple's
+    height; its lowest point: the fold. Within 6 mm, half an edge of the skin."""
+    if name == "makehuman":
+        data = request.getfixturevalue("shared") / "data" / "template_makehuman"
+        template = makehuman(Path(data))
+    else:
+        template = procedural()
+    at, curves = template.landmark_points(), template.curve_points()
+    fold = (at["breast_inferior_left"][2] + at["breast_inferior_right"][2]) / 2
+    assert at["xiphoid"][2] == pytest.approx(0.1 * at["sternal_notch"][2] + 0.9 * fold, abs=6e-3)
+    for side, sign in (("left", 1), ("right", -1)):
+        medial, lateral = level_with(curves[f"breast_{side}"], at[f"nipple_{side}"])
+        assert np.linalg.norm(at[f"breast_medial_{side}"] - medial) < 6e-3
+        assert np.linalg.norm(at[f"breast_lateral_{side}"] - lateral) < 6e-3
+        assert sign * medial[0] < sign * at[f"nipple_{side}"][0] < sign * lateral[0]
+        lowest = curves[f"breast_{side}"][:, 2].min()
+        assert at[f"breast_inferior_{side}"][2] == pytest.approx(lowest, abs=6e-3)
+
+
+def test_level_points_of_a_circle_are_its_chord():
+    """x² + z² = 1 at z = 0.6: x = ±0.8; of 400 chords, within their sagitta 4e-5."""
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    circle = np.column_stack([2 + np.cos(angle), 0 * angle, np.sin(angle)])
+    inner, outer = level_with(circle, np.array([2.0, 0.0, 0.6]))
+    assert np.allclose(inner, (1.2, 0, 0.6), atol=1e-4)
+    assert np.allclose(outer, (2.8, 0, 0.6), atol=1e-4)
