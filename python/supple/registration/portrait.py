@@ -122,7 +122,7 @@ def _drawing(axes: Any, portrait: Portrait) -> None:
     """Curves, thin and dotted where they are on no scan; landmarks with their names."""
     for name, curve in portrait.curves.items():
         flat = _flat(curve.points, portrait.frame)
-        on = curve.on_scan
+        on: Any = curve.on_scan
         if curve.closed:
             flat, on = np.vstack([flat, flat[:1]]), np.append(on, on[:1])
         off = np.where(on[:, None], np.nan, flat)
