@@ -13,12 +13,5 @@ void bind_closest_point(py::module_& module) {
       .def_readonly("barycentric", &Projection::barycentric);
   py::class_<supple::SurfaceTree>(module, "SurfaceTree")
       .def(py::init<const supple::Points&, const supple::Triangles&>(), Unlocked())
-      .def("closest",
-           py::overload_cast<const supple::Points&>(&supple::SurfaceTree::closest, py::const_),
-           Unlocked())
-      .def("closest",
-           py::overload_cast<const supple::Points&, const Eigen::VectorXi&, double>(
-               &supple::SurfaceTree::closest, py::const_),
-           Unlocked())
-      .def("refit", &supple::SurfaceTree::refit, Unlocked());
+      .def("closest", &supple::SurfaceTree::closest, Unlocked());
 }

@@ -82,6 +82,7 @@ void bind_settings(py::module_& module) {
           [](RigStage& stage, int moves) { stage.moves = static_cast<Moves>(moves); })
       .def_readwrite("iterations", &RigStage::iterations)
       .def_readwrite("tolerance", &RigStage::tolerance)
+      .def_readwrite("flat", &RigStage::flat)
       .def_readwrite("reach", &RigStage::reach)
       .def_readwrite("loss", &RigStage::loss)
       .def_readwrite("angle", &RigStage::angle)
@@ -113,6 +114,17 @@ void bind_result(py::module_& module) {
                                return border;
                              })
       .def_readonly("oriented", &ScanCloud::oriented);
+  using supple::RigEvaluation;
+  py::class_<RigEvaluation>(module, "RigEvaluation")
+      .def_readonly("terms", &RigEvaluation::terms)
+      .def_readonly("gradient", &RigEvaluation::gradient)
+      .def_readonly("matrix", &RigEvaluation::matrix)
+      .def_readonly("vertex", &RigEvaluation::vertex)
+      .def_readonly("share", &RigEvaluation::share)
+      .def_readonly("direction", &RigEvaluation::direction)
+      .def_readonly("target", &RigEvaluation::target)
+      .def_readonly("weight", &RigEvaluation::weight)
+      .def_readonly("loss", &RigEvaluation::loss);
   py::class_<RigFitResult>(module, "RigFitResult")
       .def_property_readonly("posture",
                              [](const RigFitResult& result) { return arrays(result.posture); })

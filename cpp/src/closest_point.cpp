@@ -177,7 +177,8 @@ struct SurfaceTree::Tree {
   }
 
   /// Nearer children first; a box as far as the best hit is still opened, for the sake of ties.
-  Hit closest(const Vec3& q, Hit best = Hit()) const {
+  Hit closest(const Vec3& q) const {
+    Hit best;
     std::array<std::pair<double, int>, 64> stack; // depth ≤ 32: every split halves
     std::size_t top = 0;
     stack[top++] = {nodes[0].box.squared_distance(q), 0};
@@ -204,30 +205,10 @@ struct SurfaceTree::Tree {
 
   void visit_leaf(const Vec3& q, const Node& node, Hit& best) const {
     for (int k = node.begin; k < node.end; ++k) {
-      const Hit hit = on(order[static_cast<std::size_t>(k)], q);
+      const int t = order[static_cast<std::size_t>(k)];
+      Hit hit = closest_on_triangle(q, corners(t));
+      hit.triangle = t;
       if (hit.better_than(best)) best = hit;
-    }
-  }
-
-  Hit on(int t, const Vec3& q) const {
-    Hit hit = closest_on_triangle(q, corners(t));
-    hit.triangle = t;
-    return hit;
-  }
-
-  /// Children stand behind their parents.
-  void refit() {
-    for (std::size_t k = nodes.size(); k-- > 0;) {
-      Node& node = nodes[k];
-      node.box = Box();
-      if (node.right >= 0) {
-        node.box.add(nodes[k + 1].box);
-        node.box.add(nodes[static_cast<std::size_t>(node.right)].box);
-        continue;
-      }
-      for (int i = node.begin; i < node.end; ++i)
-        node.box.add(box_of(order[static_cast<std::size_t>(i)]));
-      node.box.grow();
     }
   }
 
@@ -270,49 +251,22 @@ SurfaceTree& SurfaceTree::operator=(SurfaceTree&&) noexcept = default;
 SurfaceTree::~SurfaceTree() = default;
 
 Projection SurfaceTree::closest(const Points& query) const {
-  return closest(query, {}, std::numeric_limits<double>::infinity());
-}
-
-Projection SurfaceTree::closest(const Points& query, const Eigen::VectorXi& hint,
-                                double reach) const {
   if (!query.allFinite())
     throw NumericalError("query must be finite, got NaN or infinity; look at the points given");
   const Eigen::Index n = query.rows();
-  if (hint.size() > 0) {
-    require_size("hint", hint.size(), n, "give one a point, or none");
-    if (n > 0 && (hint.maxCoeff() >= tree_->triangles.rows() || hint.minCoeff() < -1))
-      throw ShapeError("hint must name triangles from 0 to " +
-                       std::to_string(tree_->triangles.rows() - 1) + ", or be -1");
-  }
   Projection result{Points(n, 3),       Eigen::VectorXi(n), Eigen::VectorXd(n),
                     Eigen::VectorXi(n), Points(n, 3),       Points(n, 3)};
 #pragma omp parallel for schedule(dynamic, 64)
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Vec3 q = query.row(i).transpose();
-    Hit start;
-    start.squared = reach * reach;
-    if (hint.size() > 0 && hint[i] >= 0) {
-      const Hit hit = tree_->on(hint[i], q);
-      if (hit.squared <= start.squared) start = hit;
-    }
-    const Hit hit = tree_->closest(q, start);
-    const bool found = hit.triangle >= 0;
+    const Hit hit = tree_->closest(query.row(i).transpose());
     result.point.row(i) = hit.point.transpose();
     result.triangle[i] = hit.triangle;
-    result.distance[i] = found ? std::sqrt(hit.squared) : std::numeric_limits<double>::infinity();
+    result.distance[i] = std::sqrt(hit.squared);
     result.feature[i] = hit.feature;
-    result.normal.row(i).setZero();
-    if (found) result.normal.row(i) = tree_->normal(hit.triangle).transpose();
+    result.normal.row(i) = tree_->normal(hit.triangle).transpose();
     result.barycentric.row(i) = hit.weights.transpose();
   }
   return result;
-}
-
-void SurfaceTree::refit(const Points& vertices) {
-  require_size("vertices", vertices.rows(), tree_->vertices.rows(), "make a tree of its own");
-  check_surface(vertices, tree_->triangles);
-  tree_->vertices = vertices;
-  tree_->refit();
 }
 
 Projection closest_points(const Points& query, const Points& vertices, const Triangles& triangles) {

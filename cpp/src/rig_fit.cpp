@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "rig_energy.hpp"
 #include "rig_match.hpp"
+#include "rig_moves.hpp"
 #include "rig_scan.hpp"
-#include "rig_step.hpp"
+#include "rig_spread.hpp"
 #include "supple/error.hpp"
 
 namespace supple {
@@ -20,69 +22,6 @@ using Index = Eigen::Index;
 double now() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
   return std::chrono::duration<double>(since).count();
-}
-
-/// Columns: all bones turned about `centre`, shifted, scaled, as one body.
-Eigen::MatrixXd as_one_body(const Rig& rig, const RigPosture& posture, const Vec3& centre) {
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(rig.unknowns(), 7);
-  for (int k = 0; k < rig.bones(); ++k) {
-    const std::size_t s = static_cast<std::size_t>(k);
-    const Vec3 arm = rig.joint(k) + posture.translations[s] - centre;
-    M.block<3, 3>(9 * k, 0).setIdentity();
-    M.block<3, 3>(9 * k + 3, 0) = -skew<double>(arm);
-    M.block<3, 3>(9 * k + 3, 3).setIdentity();
-    M.block<3, 1>(9 * k + 3, 6) = arm;
-    M.block<3, 1>(9 * k + 6, 6) = posture.scales[s];
-  }
-  return M;
-}
-
-std::vector<char> free_unknowns(const Rig& rig, Moves moves) {
-  std::vector<char> free(static_cast<std::size_t>(rig.unknowns()), moves == Moves::All);
-  for (int k = 0; k < rig.bones(); ++k)
-    for (int c = 0; c < 9; ++c)
-      free[static_cast<std::size_t>(9 * k + c)] = c < 6 || moves != Moves::Bones;
-  return free;
-}
-
-/// Median of the absolute values × 1.4826: the standard deviation of normal values, deaf to
-/// outliers.
-double robust_sd(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  for (double& value : values)
-    value = std::abs(value);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return 1.4826 * *middle;
-}
-
-/// Mean residual of the rows in each cube of `size` m.
-std::vector<double> patch_means(const std::vector<Row>& rows, const Points& vertices, double size) {
-  struct Entry {
-    std::array<long, 3> cube;
-    double weight, residual;
-  };
-  std::vector<Entry> entries;
-  for (const Row& row : rows) {
-    const double residual = row.residual(vertices);
-    const double weight = row.weight * loss_weight(residual, row.loss);
-    const Vec3 cube = (row.target / size).array().floor();
-    entries.push_back(
-        {{std::lround(cube[0]), std::lround(cube[1]), std::lround(cube[2])}, weight, residual});
-  }
-  std::stable_sort(entries.begin(), entries.end(),
-                   [](const Entry& a, const Entry& b) { return a.cube < b.cube; });
-  std::vector<double> means;
-  for (std::size_t i = 0; i < entries.size();) {
-    double sum = 0.0, weight = 0.0;
-    const auto cube = entries[i].cube;
-    for (; i < entries.size() && entries[i].cube == cube; ++i) {
-      sum += entries[i].weight * entries[i].residual;
-      weight += entries[i].weight;
-    }
-    if (weight > 0.0) means.push_back(sum / weight);
-  }
-  return means;
 }
 
 /// One fit under way.
@@ -104,10 +43,34 @@ class Run {
     return std::move(result_);
   }
 
+  RigEvaluation evaluate(const RigPosture& at, const RigStage& stage) {
+    matcher_.match(*state_, stage, weights_, priors_, pairs_);
+    state_ = std::make_unique<SkinState>(rig_, at);
+    assemble();
+    std::vector<Row> rows = pairs_.rows;
+    rows.insert(rows.end(), marks_.begin(), marks_.end());
+    const Index n = static_cast<Index>(rows.size());
+    RigEvaluation e{
+        terms(),      normal_.gradient,   normal_.matrix.selfadjointView<Eigen::Lower>(),
+        {},           Points(n, 3),       Points(n, 3),
+        Points(n, 3), Eigen::VectorXd(n), Eigen::VectorXd(n)};
+    e.vertex.resize(n, 3);
+    for (Index i = 0; i < n; ++i) {
+      const Row& row = rows[static_cast<std::size_t>(i)];
+      e.vertex.row(i) << row.vertex[0], row.vertex[1], row.vertex[2];
+      e.share.row(i) << row.share[0], row.share[1], row.share[2];
+      e.direction.row(i) = row.direction.transpose();
+      e.target.row(i) = row.target.transpose();
+      e.weight[i] = row.weight;
+      e.loss[i] = row.loss;
+    }
+    return e;
+  }
+
  private:
   /// Iterations of a stage.
   int settle(const RigStage& stage) {
-    double damping = 1e-6;
+    double damping = 1e-6, before = std::numeric_limits<double>::infinity();
     result_.converged = false;
     for (int i = 0; i < stage.iterations; ++i) {
       matcher_.match(*state_, stage, weights_, priors_, pairs_);
@@ -116,7 +79,9 @@ class Run {
       result_.history.push_back(energy);
       assemble();
       if (!improve(stage.moves, energy, damping)) return i + 1;
-      if (result_.last_step > stage.tolerance) continue;
+      const bool flat = std::abs(before - energy) < stage.flat * energy;
+      before = energy;
+      if (!flat && result_.last_step > stage.tolerance) continue;
       result_.converged = true;
       return i + 1;
     }
@@ -164,38 +129,8 @@ class Run {
   }
 
   bool propose(Moves moves, double damping, Eigen::VectorXd& step) const {
-    if (moves == Moves::Rigid) return propose_rigid(damping, step);
-    const Conditions hold = conditions(rig_, state_->posture, priors_);
-    Eigen::VectorXd lower, upper;
-    bounds(lower, upper);
-    return solve_step({normal_.matrix, normal_.gradient, hold.matrix, hold.value, lower, upper,
-                       free_unknowns(rig_, moves), damping},
-                      step);
-  }
-
-  bool propose_rigid(double damping, Eigen::VectorXd& step) const {
-    const Vec3 centre = state_->points.colwise().mean().transpose();
-    const Eigen::MatrixXd M = as_one_body(rig_, state_->posture, centre);
-    Eigen::MatrixXd small = M.transpose() * (normal_.matrix.selfadjointView<Eigen::Lower>() * M);
-    small.diagonal() *= 1.0 + damping;
-    const Eigen::LLT<Eigen::MatrixXd> factor(small);
-    if (factor.info() != Eigen::Success) return false;
-    step = -(M * factor.solve(M.transpose() * normal_.gradient));
-    return step.allFinite();
-  }
-
-  /// What a step may be so that scales and blend stay in their ranges; the start may be outside.
-  void bounds(Eigen::VectorXd& lower, Eigen::VectorXd& upper) const {
-    const double inf = std::numeric_limits<double>::infinity();
-    lower = Eigen::VectorXd::Constant(rig_.unknowns(), -inf);
-    upper = Eigen::VectorXd::Constant(rig_.unknowns(), inf);
-    for (int k = 0; k < rig_.bones(); ++k) {
-      const Vec3& scale = state_->posture.scales[static_cast<std::size_t>(k)];
-      lower.segment<3>(9 * k + 6) = (priors_.scale_lower - scale.array()).min(0.0);
-      upper.segment<3>(9 * k + 6) = (priors_.scale_upper - scale.array()).max(0.0);
-    }
-    lower.tail(rig_.shapes()) = (priors_.blend_lower - state_->posture.blend).cwiseMin(0.0);
-    upper.tail(rig_.shapes()) = (priors_.blend_upper - state_->posture.blend).cwiseMax(0.0);
+    if (moves == Moves::Rigid) return rigid_step(rig_, *state_, normal_, damping, step);
+    return free_step(rig_, *state_, priors_, moves, normal_, damping, step);
   }
 
   void report(RigStage stage) {
@@ -203,12 +138,17 @@ class Run {
     matcher_.match(*state_, stage, weights_, priors_, pairs_);
     need_pairs(stage);
     result_.posture = state_->posture;
-    result_.terms = prior_terms(rig_, state_->posture, weights_, priors_);
-    result_.terms.data = energy_of(pairs_.rows, state_->points);
-    result_.terms.landmark = energy_of(marks_, state_->points);
+    result_.terms = terms();
     report_matrices();
     report_spread();
     report_pairs();
+  }
+
+  RigTerms terms() const {
+    RigTerms terms = prior_terms(rig_, state_->posture, weights_, priors_);
+    terms.data = energy_of(pairs_.rows, state_->points);
+    terms.landmark = energy_of(marks_, state_->points);
+    return terms;
   }
 
   void report_matrices() {
@@ -284,13 +224,41 @@ const ScanCloud& RigFit::scan() const {
   return state_->scan;
 }
 
+void RigFit::check_ready(const RigPosture& start) const {
+  if (state_->scan.points.rows() == 0)
+    throw StateError("a fit must have a scan; call set_scan first");
+  state_->rig->check(start);
+}
+
+RigEvaluation RigFit::evaluate(const RigPosture& pairs_at, const RigPosture& at,
+                               const RigWeights& weights, const RigPriors& priors,
+                               const RigStage& stage, const RigLandmarks& landmarks) {
+  check_ready(pairs_at);
+  check_ready(at);
+  Run run(*state_->rig, state_->matcher, state_->sums, weights, priors, landmarks, pairs_at);
+  return run.evaluate(at, stage);
+}
+
+RigLanding RigFit::land(const RigPosture& posture, const Points& points) {
+  if (!points.allFinite())
+    throw NumericalError("points must be finite, got NaN or infinity; look at the points given");
+  const std::vector<Landing> landed = state_->matcher.land(state_->rig->posed(posture), points);
+  const Index n = points.rows();
+  RigLanding result{Eigen::VectorXi(n), Points(n, 3), Eigen::VectorXd(n)};
+  for (Index i = 0; i < n; ++i) {
+    const Landing& at = landed[static_cast<std::size_t>(i)];
+    result.triangle[i] = at.triangle;
+    result.barycentric.row(i) = at.barycentric.transpose();
+    result.distance[i] = std::sqrt(at.squared);
+  }
+  return result;
+}
+
 RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                          const RigPriors& priors, const std::vector<RigStage>& stages,
                          const RigLandmarks& landmarks) {
-  if (state_->scan.points.rows() == 0)
-    throw StateError("a fit must have a scan; call set_scan first");
+  check_ready(start);
   if (stages.empty()) throw ShapeError("stages must be one at least, got none; give a schedule");
-  state_->rig->check(start);
   Run run(*state_->rig, state_->matcher, state_->sums, weights, priors, landmarks, start);
   return run.through(stages);
 }

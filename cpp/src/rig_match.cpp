@@ -26,14 +26,14 @@ Vec3 direction_of(const Vec3& skin, Vec3 scan, bool oriented, double cosine) {
 
 } // namespace
 
-Matcher::Matcher(const Rig& rig) : rig_(rig), vertex_order_(PointTree(rig.points()).order()) {
-  skin_.emplace(rig.points(), rig.triangles());
-}
+Matcher::Matcher(const Rig& rig)
+    : rig_(rig), skin_(rig.points(), rig.triangles()),
+      vertex_order_(PointTree(rig.points()).order()) {}
 
 void Matcher::set_scan(const ScanCloud& scan) {
   scan_ = &scan;
   tree_ = PointTree(scan.points);
-  hint_ = Eigen::VectorXi::Constant(scan.points.rows(), -1);
+  hint_.assign(static_cast<std::size_t>(scan.points.rows()), -1);
 }
 
 void Matcher::turn_normals(const Points& points) {
@@ -55,62 +55,80 @@ void Matcher::turn_normals(const Points& points) {
 
 void Matcher::match(const SkinState& state, const RigStage& stage, const RigWeights& weights,
                     const RigPriors& priors, Pairs& pairs) {
-  skin_->refit(state.points);
+  skin_.refit(state.points);
   turn_normals(state.points);
   pairs.rows.clear();
   pairs.area = 0.0;
   const double patch = priors.patch * priors.noise;
   const double weight = weights.data / (patch * patch);
-  from_scan(state, stage, weight * (1.0 - stage.template_share), pairs);
+  from_scan(stage, weight * (1.0 - stage.template_share), pairs);
   from_template(state, stage, weight * stage.template_share, pairs);
 }
 
-void Matcher::from_scan(const SkinState& state, const RigStage& stage, double weight,
-                        Pairs& pairs) {
-  const Index all = scan_->points.rows(), every = std::max(1, stage.every_point);
-  const Index count = (all + every - 1) / every;
-  Points query(count, 3);
-  Eigen::VectorXi hint(count);
-  for (Index i = 0; i < count; ++i) {
-    query.row(i) = scan_->points.row(i * every);
-    hint[i] = hint_[i * every];
+std::vector<Landing> Matcher::land(const Points& vertices, const Points& points) {
+  skin_.refit(vertices);
+  std::vector<Landing> landed(static_cast<std::size_t>(points.rows()));
+  const double far = std::numeric_limits<double>::max();
+#pragma omp parallel
+  {
+    int hint = -1;
+#pragma omp for schedule(static)
+    for (std::size_t i = 0; i < landed.size(); ++i) {
+      landed[i] = skin_.closest(points.row(static_cast<Index>(i)).transpose(), far, hint);
+      hint = landed[i].leaf;
+    }
   }
-  const Projection hit = skin_->closest(query, hint, stage.reach);
+  return landed;
+}
+
+void Matcher::from_scan(const RigStage& stage, double weight, Pairs& pairs) {
+  const Index all = scan_->points.rows(), every = std::max(1, stage.every_point);
   pairs.triangle.setConstant(all, -1);
   pairs.barycentric.setZero(all, 3);
   pairs.distance.setConstant(all, std::numeric_limits<double>::quiet_NaN());
   pairs.row_of.assign(static_cast<std::size_t>(all), -1);
-  const double cosine = std::cos(stage.angle * kDegree);
-  for (Index i = 0; i < count; ++i) {
-    const int t = hit.triangle[i];
-    if (t < 0) continue;
-    const Index p = i * every;
-    hint_[p] = t;
-    Row row;
-    Vec3 skin = Vec3::Zero();
-    bool inside = hit.feature[i] == 0;
-    for (int c = 0; c < 3; ++c) {
-      const int v = rig_.triangles()(t, c);
-      row.vertex[static_cast<std::size_t>(c)] = v;
-      row.share[static_cast<std::size_t>(c)] = hit.barycentric(i, c);
-      if (hit.barycentric(i, c) == 0.0) continue;
-      skin += hit.barycentric(i, c) * normals_.row(v).transpose();
-      inside = inside || !rig_.at_border(v);
-    }
-    row.direction =
-        direction_of(skin.normalized(), scan_->normals.row(p).transpose(), scan_->oriented, cosine);
-    if (!inside || row.direction.isZero(0.0)) continue;
-    row.target = query.row(i).transpose();
-    row.weight = weight * scan_->area[p] * static_cast<double>(every);
-    row.loss = stage.loss;
-    pairs.triangle[p] = t;
-    pairs.barycentric.row(p) = hit.barycentric.row(i);
-    pairs.distance[p] = hit.distance[i];
-    pairs.row_of[static_cast<std::size_t>(p)] = static_cast<int>(pairs.rows.size());
-    pairs.area += scan_->area[p] * static_cast<double>(every);
-    if (weight > 0.0) pairs.rows.push_back(row);
+  std::vector<Landing> landed(static_cast<std::size_t>((all + every - 1) / every));
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < landed.size(); ++i) {
+    const Index p = static_cast<Index>(i) * every;
+    int& hint = hint_[static_cast<std::size_t>(p)];
+    landed[i] = skin_.closest(scan_->points.row(p).transpose(), stage.reach, hint);
+    if (landed[i].leaf >= 0) hint = landed[i].leaf;
   }
-  static_cast<void>(state);
+  for (std::size_t i = 0; i < landed.size(); ++i)
+    if (landed[i].triangle >= 0)
+      add_landing(stage, weight * static_cast<double>(every), static_cast<Index>(i) * every,
+                  landed[i], pairs);
+}
+
+/// A row, unless the point lands at the template's border or sees its other side.
+void Matcher::add_landing(const RigStage& stage, double weight, Index p, const Landing& at,
+                          Pairs& pairs) {
+  Row row;
+  Vec3 skin = Vec3::Zero();
+  bool inside = at.barycentric.minCoeff() > 0.0;
+  for (int c = 0; c < 3; ++c) {
+    const int v = rig_.triangles()(at.triangle, c);
+    row.vertex[static_cast<std::size_t>(c)] = v;
+    row.share[static_cast<std::size_t>(c)] = at.barycentric[c];
+    if (at.barycentric[c] == 0.0) continue;
+    skin += at.barycentric[c] * normals_.row(v).transpose();
+    inside = inside || !rig_.at_border(v);
+  }
+  if (!inside) return;
+  row.direction = direction_of(skin.normalized(), scan_->normals.row(p).transpose(),
+                               scan_->oriented, std::cos(stage.angle * kDegree));
+  if (row.direction.isZero(0.0)) return;
+  row.target = scan_->points.row(p).transpose();
+  row.weight = weight * scan_->area[p];
+  row.loss = stage.loss;
+  pairs.triangle[p] = at.triangle;
+  pairs.barycentric.row(p) = at.barycentric.transpose();
+  pairs.distance[p] = std::sqrt(at.squared);
+  pairs.area += scan_->area[p];
+  if (!(weight > 0.0)) return;
+  pairs.row_of[static_cast<std::size_t>(p)] = static_cast<int>(pairs.rows.size());
+  pairs.rows.push_back(row);
 }
 
 void Matcher::from_template(const SkinState& state, const RigStage& stage, double weight,

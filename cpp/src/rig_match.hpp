@@ -1,10 +1,9 @@
 /// Pairs of a posed template and a scan, both ways; private to the runtime.
 #pragma once
 
-#include <optional>
-
 #include "point_tree.hpp"
 #include "rig_rows.hpp"
+#include "rig_tree.hpp"
 #include "supple/rig_fit.hpp"
 
 namespace supple {
@@ -25,6 +24,8 @@ class Matcher {
  public:
   explicit Matcher(const Rig& rig);
   void set_scan(const ScanCloud& scan);
+  /// Each of `points` (m, 3) on the skin at `vertices`, however far.
+  std::vector<Landing> land(const Points& vertices, const Points& points);
 
   /// Rows' weights are areas/(patch² noise²) × the data's weight, so that a patch counts as one
   /// observation, however many points it holds.
@@ -32,18 +33,20 @@ class Matcher {
              const RigPriors& priors, Pairs& pairs);
 
  private:
-  void from_scan(const SkinState& state, const RigStage& stage, double weight, Pairs& pairs);
+  void from_scan(const RigStage& stage, double weight, Pairs& pairs);
+  void add_landing(const RigStage& stage, double weight, Eigen::Index p, const Landing& at,
+                   Pairs& pairs);
   void from_template(const SkinState& state, const RigStage& stage, double weight, Pairs& pairs);
   void turn_normals(const Points& points);
 
   const Rig& rig_;
   const ScanCloud* scan_ = nullptr;
-  std::optional<SurfaceTree> skin_;
+  SkinTree skin_;
   PointTree tree_;
   std::vector<int> vertex_order_; ///< neighbours near each other
   Points normals_;                ///< (n, 3) of the posed template, unit
   Eigen::VectorXd areas_;         ///< (n) m², a third of the triangles around
-  Eigen::VectorXi hint_;
+  std::vector<int> hint_;         ///< (c) leaf of the skin's tree where each point landed last
 };
 
 } // namespace supple

@@ -58,7 +58,7 @@ class NormalSum {
   void add(const std::vector<Row>& rows, const SkinState& state, Normal& normal);
 
  private:
-  static constexpr int kSums = 8, kChunk = 128;
+  static constexpr int kSums = 4, kChunk = 192;
   struct Part {
     Eigen::MatrixXd matrix, panel, product;
     Eigen::VectorXd gradient, residual, step;

@@ -112,6 +112,7 @@ struct Around {
   Points normal;         ///< along their least spread; 0 of fewer than four
   Eigen::VectorXd share; ///< m² of the surface: the disc over what its points hold, times its own
   std::vector<char> border; ///< they lie to one side
+  Eigen::VectorXd dip;      ///< m, along the normal: their mean against the point
 };
 
 /// `held`: scan points that each of the cloud's stands for. The mean of a half disc is 0.42 of its
@@ -120,7 +121,7 @@ Around look_around(const Points& points, const Eigen::VectorXd& held, const Poin
                    double radius) {
   const Index n = points.rows();
   Around found{Points::Zero(n, 3), Eigen::VectorXd(n),
-               std::vector<char>(static_cast<std::size_t>(n))};
+               std::vector<char>(static_cast<std::size_t>(n)), Eigen::VectorXd::Zero(n)};
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < n; ++i) {
     const Vec3 centre = points.row(i).transpose();
@@ -140,12 +141,22 @@ Around look_around(const Points& points, const Eigen::VectorXd& held, const Poin
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread;
       spread.computeDirect(moment / all - mean * mean.transpose());
       found.normal.row(i) = spread.eigenvectors().col(0).transpose();
+      found.dip[i] = mean.dot(spread.eigenvectors().col(0));
     }
     const double aside = mean.norm() / radius;
     found.share[i] = kPi * radius * radius * std::max(1.0 - 1.18 * aside, 0.3) * held[i] / all;
     found.border[static_cast<std::size_t>(i)] = count < 4 || aside > 0.28;
   }
   return found;
+}
+
+/// Puts means back on a curved surface. The mean of a square of side h is h²/12 · H off it, H the
+/// mean curvature; that of a disc of radius r, r²/4 · H: the difference is what `dip` measures.
+void uncurve(Around& around, double size, double radius, Points& points) {
+  const double square = size * size / 12.0, disc = radius * radius / 4.0;
+  for (Index i = 0; i < points.rows(); ++i)
+    if (!around.border[static_cast<std::size_t>(i)])
+      points.row(i) -= square / (disc - square) * around.dip[i] * around.normal.row(i);
 }
 
 /// `normals` of the neighbours' spread, turned to the side of `sides`.
@@ -214,6 +225,7 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
   cloud.oriented = given || meshed;
   const PointTree tree(cloud.points);
   Around around = look_around(cloud.points, held, tree, 2.2 * settings.voxel);
+  if (settings.thin) uncurve(around, settings.voxel, 2.2 * settings.voxel, cloud.points);
   if (!given) {
     if (meshed) turn_to(cloud.normals, around.normal);
     cloud.normals.swap(around.normal);

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 #include <vector>
 
-#include "supple/rig.hpp"
+#include "rig_dual.hpp"
 
 namespace supple {
 
@@ -78,9 +79,11 @@ struct LinearBones {
 
 /// A posed skin and what its derivatives need.
 struct SkinState {
+  using Vec3 = Eigen::Vector3d;
   const Rig& rig;
   RigPosture posture;
   LinearBones<double> bones;
+  std::optional<DualBones<double>> dual;
   Points shape;                          ///< (n, 3) m, x
   Points points;                         ///< (n, 3) m, v
   std::vector<Eigen::Matrix3d> gradient; ///< ∂v/∂x
@@ -88,33 +91,86 @@ struct SkinState {
   SkinState(const Rig& of, const RigPosture& at)
       : rig(of), posture(at), bones(of, at), shape(of.vertices(), 3), points(of.vertices(), 3),
         gradient(static_cast<std::size_t>(of.vertices())) {
+    if (rig.skinning() == Skinning::DualQuaternion) dual.emplace(rig, posture);
 #pragma omp parallel for schedule(static)
     for (int i = 0; i < rig.vertices(); ++i) {
-      const Eigen::Vector3d x = shape_at<double>(rig, posture.blend, i);
+      const Vec3 x = shape_at<double>(rig, posture.blend, i);
       shape.row(i) = x.transpose();
-      points.row(i) = bones.vertex(rig, i, x).transpose();
-      gradient[static_cast<std::size_t>(i)] = bones.gradient(rig, i);
+      points.row(i) = (dual ? dual->vertex(rig, i, x) : bones.vertex(rig, i, x)).transpose();
+      gradient[static_cast<std::size_t>(i)] = dual ? dual_gradient(i) : bones.gradient(rig, i);
     }
   }
 
   /// add(column, ∂(d·v_i)/∂unknown) for every unknown that moves vertex i.
   template <class Add>
-  void add_row(int i, const Eigen::Vector3d& d, const Add& add) const {
-    const Eigen::Vector3d x = shape.row(i).transpose();
+  void add_row(int i, const Vec3& d, const Add& add) const {
+    if (dual)
+      add_dual(i, d, add);
+    else
+      add_linear(i, d, add);
+    const Vec3 pull = gradient[static_cast<std::size_t>(i)].transpose() * d;
+    for (const ShapeOffset& at : rig.shapes_at(i))
+      add(9 * rig.bones() + at.shape, pull.dot(at.offset));
+  }
+
+ private:
+  template <class Add>
+  static void add_bone(int bone, const Vec3& turn, const Vec3& push, const Vec3& stretch,
+                       const Add& add) {
+    for (int c = 0; c < 3; ++c) {
+      add(9 * bone + c, turn[c]);
+      add(9 * bone + 3 + c, push[c]);
+      add(9 * bone + 6 + c, stretch[c]);
+    }
+  }
+
+  template <class Add>
+  void add_linear(int i, const Vec3& d, const Add& add) const {
+    const Vec3 x = shape.row(i).transpose();
     for (const BoneWeight& at : rig.bones_at(i)) {
       const std::size_t k = static_cast<std::size_t>(at.bone);
-      const Eigen::Vector3d arm = x - rig.joint(at.bone), push = at.weight * d;
-      const Eigen::Vector3d turn = (bones.affine[k] * arm).cross(push);
-      const Eigen::Vector3d stretch = (posture.rotations[k].transpose() * push).cwiseProduct(arm);
-      for (int c = 0; c < 3; ++c) {
-        add(9 * at.bone + c, turn[c]);
-        add(9 * at.bone + 3 + c, push[c]);
-        add(9 * at.bone + 6 + c, stretch[c]);
-      }
+      const Vec3 arm = x - rig.joint(at.bone), push = at.weight * d;
+      const Vec3 lever = bones.affine[k] * arm;
+      add_bone(at.bone, lever.cross(push), push,
+               (posture.rotations[k].transpose() * push).cwiseProduct(arm), add);
     }
-    const Eigen::Vector3d pull = gradient[static_cast<std::size_t>(i)].transpose() * d;
-    for (const ShapeOffset& shape_of : rig.shapes_at(i))
-      add(9 * rig.bones() + shape_of.shape, pull.dot(shape_of.offset));
+  }
+
+  template <class Add>
+  void add_dual(int i, const Vec3& d, const Add& add) const {
+    const Vec3 x = shape.row(i).transpose(), u = dual->scaled(rig, i, x);
+    const auto blend = dual->blend(rig, i);
+    const Vec3 back = turn_of_blend(blend).transpose() * d;
+    Quaternion<double> of_real, of_dual;
+    pull_back(blend, u, d, of_real, of_dual);
+    const std::size_t heavy = DualBones<double>::heaviest(rig, i);
+    for (const BoneWeight& at : rig.bones_at(i)) {
+      const std::size_t k = static_cast<std::size_t>(at.bone);
+      const Quaternion<double>& q = dual->real[k];
+      const Vec3 joint = rig.joint(at.bone), far = posture.rotations[k] * joint;
+      const Vec3 shift = joint + posture.translations[k] - far;
+      const double weight = at.weight * dual->sign(k, heavy);
+      const Vec3 push = 0.5 * weight * pulled(of_dual, q);
+      Quaternion<double> through; // (0, shift)ᵀ of_dual
+      through[0] = shift.dot(of_dual.tail<3>());
+      through.tail<3>() = -of_dual[0] * shift + of_dual.tail<3>().cross(shift);
+      const Vec3 turn =
+          weight * (0.5 * pulled(of_real, q) + 0.25 * pulled(through, q)) - far.cross(push);
+      add_bone(at.bone, turn, push, at.weight * back.cwiseProduct(x - joint), add);
+    }
+  }
+
+  static Eigen::Matrix3d turn_of_blend(const DualBones<double>::Blend& b) {
+    return Eigen::Quaterniond(b.real[0], b.real[1], b.real[2], b.real[3])
+        .normalized()
+        .toRotationMatrix();
+  }
+
+  Eigen::Matrix3d dual_gradient(int i) const {
+    Vec3 scale = Vec3::Zero();
+    for (const BoneWeight& at : rig.bones_at(i))
+      scale += at.weight * posture.scales[static_cast<std::size_t>(at.bone)];
+    return turn_of_blend(dual->blend(rig, i)) * scale.asDiagonal();
   }
 };
 

@@ -37,7 +37,7 @@ def crude_torso(around: int = 40, along: int = 30, shapes: int = 12, seed: int =
 
 
 def some_posture(template: Template, seed: int, size: float = 1.0) -> Posture:
-    """Every unknown moved at random: turns of 0.1 rad, shifts of 1 cm, scales of 5 %, blend of 1."""
+    """Every unknown at random: turns of 0.1 rad, shifts of 1 cm, scales of 5 %, blend of 0.7."""
     rng = np.random.default_rng(seed)
     bones, shapes = len(template.bones), len(template.blendshapes)
     per_bone = rng.standard_normal((bones, 3, 3)) * np.array([0.1, 0.01, 0.05])[:, None]
@@ -81,8 +81,8 @@ def _tube(around: int, along: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bones() -> tuple[Bone, ...]:
-    return tuple(Bone(name, parent, joint) for (name, parent), joint in zip(BONES, JOINTS,
-                                                                            strict=True))  # fmt: skip
+    named = zip(BONES, JOINTS, strict=True)
+    return tuple(Bone(name, parent, joint) for (name, parent), joint in named)
 
 
 def _weights(points: np.ndarray) -> np.ndarray:

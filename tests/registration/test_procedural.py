@@ -182,14 +182,22 @@ def test_curves_lie_on_the_sternum_and_around_the_breasts(template: Template) ->
         assert part.barycentric.min() >= 0
 
 
-def test_triangles_are_good_and_finer_on_the_breasts(template: Template) -> None:
-    """Quality 4 √3 area / Σ edge², 1 if equilateral; edges of breasts at most 0.8 of the back's."""
-    corners = template.points[template.triangles]
+@pytest.mark.parametrize("spacing", [0.032, 0.024, 0.017])
+def test_triangles_are_good_at_any_spacing(spacing: float) -> None:
+    """Quality 4 √3 area / Σ edge²: 1 if equilateral."""
+    made = torso(spacing)
+    corners = made.points[made.triangles]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    area = Surface(template.points, template.triangles).areas
+    area = Surface(made.points, made.triangles).areas
     quality = 4 * np.sqrt(3) * area / (edges**2).sum(axis=1)
     assert quality.min() > 0.3, quality.min()
     assert quality.mean() > 0.93
+
+
+def test_triangles_are_finer_on_the_breasts(template: Template) -> None:
+    """Edges of the breasts are at most 0.8 of the back's."""
+    corners = template.points[template.triangles]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     on = {name: edges[mask[template.triangles].all(axis=1)].mean()
           for name, mask in template.regions.items()}  # fmt: skip
     assert on["breast_left"] < 0.8 * on["back"], on

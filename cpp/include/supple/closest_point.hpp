@@ -38,18 +38,6 @@ class SurfaceTree {
   /// Source: Ericson (2005), Real-Time Collision Detection, §5.1.5.
   Projection closest(const Points& query) const;
 
-  /// The same where something is within `reach` m; triangle −1, distance ∞ where nothing is.
-  ///
-  /// `hint` (n, or none) names a triangle that is probably near each point, −1 if none is known:
-  /// the answer is the same with any, and comes sooner with a good one.
-  /// @throws ShapeError if a hint is no triangle.
-  Projection closest(const Points& query, const Eigen::VectorXi& hint, double reach) const;
-
-  /// Move the vertices (v, 3) m; O(t). Queries stay exact, and fast while the surface keeps its
-  /// shape more or less.
-  /// @throws ShapeError if their number is another; NumericalError if one is not finite.
-  void refit(const Points& vertices);
-
  private:
   struct Tree;
   std::unique_ptr<Tree> tree_;

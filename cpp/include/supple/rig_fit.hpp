@@ -52,6 +52,7 @@ struct RigStage {
   double point_share = 0.0;    ///< of point-to-point in it
   int every_vertex = 1;        ///< every so many vertices are used
   int every_point = 1;         ///< every so many points of the thinned scan
+  double flat = 5e-3; ///< the stage ends, too, when the energy falls by less than this share
 };
 
 /// Named points that are known on the scan.
@@ -63,7 +64,7 @@ struct RigLandmarks {
 };
 
 struct ScanSettings {
-  double voxel = 10e-3; ///< m: points within a voxel become one, their mean
+  double voxel = 12e-3; ///< m: points within a voxel become one, their mean
   bool thin = true;     ///< false: every point is used as it is
 };
 
@@ -83,7 +84,7 @@ struct RigTerms {
 
 struct RigFitResult {
   RigPosture posture;
-  bool converged = false;      ///< the last stage ended by its tolerance
+  bool converged = false;      ///< the last stage ended by tolerance, or flat
   double last_step = 0.0;      ///< m: largest movement of a vertex in the last iteration
   std::vector<int> iterations; ///< of each stage
   std::vector<double> history; ///< energy at the start of each iteration, of its own pairs
@@ -101,6 +102,24 @@ struct RigFitResult {
   Eigen::VectorXd vertex_used;  ///< (n) robust weight of each vertex' pair, 0 where it has none
 };
 
+/// The energy and its gradient at a posture, for pairs that were found at another; for tests.
+struct RigEvaluation {
+  RigTerms terms;
+  Eigen::VectorXd gradient; ///< (9K+A)
+  Eigen::MatrixXd matrix;   ///< (9K+A)² of Gauss–Newton
+  /// The rows of data, then those of landmarks, residual = direction·(Σ share v − target).
+  Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor> vertex;
+  Points share, direction, target; ///< (rows, 3)
+  Eigen::VectorXd weight, loss;    ///< (rows) 1/m² and m
+};
+
+/// Points on a skin.
+struct RigLanding {
+  Eigen::VectorXi triangle; ///< (m) of the template
+  Points barycentric;       ///< (m, 3)
+  Eigen::VectorXd distance; ///< (m) m
+};
+
 /// Fits a rig; keeps the scan and its trees. Not to be used by two threads at once.
 class RigFit {
  public:
@@ -114,12 +133,21 @@ class RigFit {
                 const ScanSettings& settings);
   const ScanCloud& scan() const;
 
+  /// Where `points` (m, 3) m land on the skin of a posture, however far.
+  RigLanding land(const RigPosture& posture, const Points& points);
+
   /// From `start` through all stages. Bitwise the same for any number of threads.
   /// @throws StateError without a scan; ShapeError; NumericalError when no pair is within reach.
   RigFitResult run(const RigPosture& start, const RigWeights& weights, const RigPriors& priors,
                    const std::vector<RigStage>& stages, const RigLandmarks& landmarks);
 
+  /// One evaluation with the pairs of `pairs_at`.
+  RigEvaluation evaluate(const RigPosture& pairs_at, const RigPosture& at,
+                         const RigWeights& weights, const RigPriors& priors, const RigStage& stage,
+                         const RigLandmarks& landmarks);
+
  private:
+  void check_ready(const RigPosture& start) const;
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -28,14 +28,18 @@ _POINTS = 40_000
 _OUTWARD = np.radians(25.0)
 #: m from the midline, between which nipples are sought, and their mean and sd.
 _NIPPLE_AT, _NIPPLE_MEAN = (0.04, 0.19), (0.105, 0.03)
+#: m around a peak over which its top is fitted.
+_ROUND = 0.026
 #: m that the nipples of a pair differ by, off the mirror (sd).
 _PAIR = 0.02
 #: m above the nipples, mean and sd over the shapes and poses of both templates; the sternum's
 #: length to the xiphoid; and the axillae's distance from the midline.
-_NOTCH_UP, _XIPHOID_UP, _AXILLA_UP = (0.157, 0.02), -0.034, (0.070, 0.015)
+_NOTCH_UP, _XIPHOID_UP, _AXILLA_UP = (0.160, 0.03), -0.034, (0.070, 0.015)
 _STERNUM, _AXILLA_ASIDE = 0.19, (0.150, 0.015)
 #: The notch lies at most this much deeper than the skin between the breasts, m.
 _DEEPEST = 0.10
+#: Share of the way from the chest's slope to the neck's that the slope has come at the notch.
+_RECOVERED = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,12 +120,39 @@ def _mounds(points: Floats, sign: float) -> list[_Mound]:
     wide, _ = view.smooth(35e-3)
     mean, _ = curvatures(top, view.pixel)
     row, column = _peaks(np.where(weight > 0.4, top, -np.inf), 5)
-    across, up = view.place(row, column)
-    place = np.stack([across, up, top[row, column]], axis=1) @ axes
+    place = np.array([_apex(view, r, k) for r, k in zip(row, column, strict=True)]).reshape(-1, 3)
+    place = place @ axes
     mounds = [_Mound(p, float(top[r, k] - wide[r, k]), float(min(weight[r, k], 1)), -mean[r, k])
               for p, r, k in zip(place, row, column, strict=True)
               if _NIPPLE_AT[0] < sign * p[0] < _NIPPLE_AT[1]]  # fmt: skip
     return sorted((m for m in mounds if m.rise > 0), key=lambda m: -m.rise)[:6]
+
+
+def _apex(view: HeightMap, row: int, column: int) -> tuple[float, float, float]:
+    """Across, up and height, m, of the top of a quadratic through the skin around a peak.
+
+    Noise moves the top of a flat dome far; it moves that of a quadratic much less.
+    """
+    reach = int(_ROUND / view.pixel)
+    rows = slice(max(row - reach, 0), row + reach + 1)
+    columns = slice(max(column - reach, 0), column + reach + 1)
+    v, u = np.nonzero(view.seen[rows, columns])
+    high = view.height[rows, columns][v, u]
+    v, u = v + rows.start - row, u + columns.start - column
+    near = u**2 + v**2 <= reach**2
+    u, v, high = u[near].astype(float), v[near].astype(float), high[near]
+    if len(u) < 12:
+        across, up = view.place(row, column)
+        return float(across), float(up), float(high.mean())
+    basis = np.stack([np.ones_like(u), u, v, u * u / 2, u * v, v * v / 2], axis=1)
+    fit = np.linalg.lstsq(basis, high, rcond=None)[0]
+    hessian, step = np.array([[fit[3], fit[4]], [fit[4], fit[5]]]), np.zeros(2)
+    if fit[3] + fit[5] < 0 and np.linalg.det(hessian) > 0:
+        step = -np.linalg.solve(hessian, fit[1:3])
+        step = step * min(1.0, 3.0 / max(float(np.linalg.norm(step)), 1e-9))
+    top = fit[0] + fit[1:3] @ step + step @ hessian @ step / 2
+    across, up = view.place(row + step[1], column + step[0])
+    return float(across), float(up), float(top)
 
 
 def _peaks(values: Floats, radius: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -141,12 +172,12 @@ def _nipples(left: list[_Mound], right: list[_Mound], likeness: float) -> dict[s
     for a in left:
         for b in right:
             off = (a.point * [-1, 1, 1] - b.point) / _PAIR
-            score = _worth(a) + _worth(b) - 0.25 * float(off[0] ** 2 + off[2] ** 2 + off[1] ** 2)
+            score = _worth(a) + _worth(b) - 0.25 * float(off @ off)
             if score > best:
-                best, chosen = score, (a, b, float(np.linalg.norm(off)))
+                best, chosen = score, (a, b)
     if chosen is None:
         return {}
-    a, b, off = chosen
+    a, b = chosen
     sure = _sigmoid(0.9 * (best - 2.0)) * (0.4 + 0.6 * min(max(likeness, 0.0) / 0.5, 1.0))
     how = "top of a breast mound, with its mirror image"
     return {"nipple_left": Proposal(a.point, sure * a.seen, how),
@@ -199,8 +230,8 @@ def _profile(front: HeightMap, half: float = 0.014, sigma: float = 0.014) -> _Pr
 
 
 def _notch(line: _Profile, step: float, level: float, trust: float) -> Proposal | None:
-    """Above the nipples, where the slope has recovered a third of the way from chest to neck."""
-    rows = np.flatnonzero((np.abs(line.up - level - _NOTCH_UP[0]) < 0.06) & (line.seen > 0.4))
+    """Above the nipples, where the slope begins to turn from the chest's to the neck's."""
+    rows = np.flatnonzero((np.abs(line.up - level - _NOTCH_UP[0]) < 0.07) & (line.seen > 0.4))
     if len(rows) < 8:
         return None
     off = (line.up[rows] - level - _NOTCH_UP[0]) / _NOTCH_UP[1]
@@ -209,7 +240,7 @@ def _notch(line: _Profile, step: float, level: float, trust: float) -> Proposal 
     above = rows[(rows >= corner) & (rows < corner + int(0.05 / step))]
     steep = below[int(np.argmin(line.slope[below]))]
     low, high = float(line.slope[steep]), float(line.slope[above].max())
-    k = min(steep + int(np.argmax(line.slope[steep:] > low + 0.35 * (high - low))), corner)
+    k = min(steep + int(np.argmax(line.slope[steep:] > low + _RECOVERED * (high - low))), corner)
     off = (line.up[k] - level - _NOTCH_UP[0]) / _NOTCH_UP[1]
     clear = _sigmoid(5.0 * (high - low - 0.5)) * min(float(line.seen[k]), 1.0)
     sure = trust * clear * float(np.exp(-0.25 * off**2))
@@ -217,9 +248,7 @@ def _notch(line: _Profile, step: float, level: float, trust: float) -> Proposal 
     return Proposal(point, sure, "corner between chest and neck on the midline")
 
 
-def _xiphoid(
-    line: _Profile, notch: Proposal | None, level: float, trust: float
-) -> Proposal | None:
+def _xiphoid(line: _Profile, notch: Proposal | None, level: float, trust: float) -> Proposal | None:
     """Where the nipples, and a sternum of the usual length below the notch, put it."""
     guess = level + _XIPHOID_UP
     if notch is not None:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from supple.errors import InputError, MeshError
 from supple.registration.gltf_write import LAYOUT
-from supple.registration.template import Bone, OnSurface, Template
+from supple.registration.template import BONES, Bone, OnSurface, Template
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -67,7 +67,7 @@ def _chunks(data: bytes, file: Path) -> tuple[bytes, bytes]:
 
 def _embedded(document: Any, file: Path) -> bytes:
     """The numbers of a .gltf file, which must stand in the file itself."""
-    uri = document.buffers[0].uri if document.buffers else None
+    uri = getattr(document.buffers[0], "uri", None) if document.buffers else None
     head, comma, body = (uri or "").partition(",")
     if not (head.startswith("data:") and head.endswith(";base64") and comma):
         raise InputError(f"{file} must hold its numbers itself, as a base64 URI, got "
@@ -86,31 +86,36 @@ class _Reader:
 
     def array(self, number: int | None, kind: str, width: str, rows: int | None = None) -> Any:
         """The (n, k) array of an accessor, which must be of ``width`` and have ``rows`` rows."""
-        accessors, views = self.document.accessors, self.document.bufferViews
+        accessors = self.document.accessors
         if number is None or not 0 <= number < len(accessors):
             raise InputError(f"{self.file} must have {kind}, got none; {_AGAIN}.")
         a = accessors[number]
-        if a.bufferView is None or not 0 <= a.bufferView < len(views) or a.sparse is not None:
-            raise InputError(f"{self.file} must hold {kind} in full, not sparse; {_AGAIN}.")
         if a.type != width or a.componentType not in _DTYPES:
             raise MeshError(f"{self.file} must hold {kind} as {width}, got {a.type}; {_AGAIN}.")
-        if rows is not None and a.count != rows:
+        if a.count < 1 or rows not in (None, a.count):
             raise MeshError(f"{self.file} must hold {kind} for {rows}, got {a.count}; {_AGAIN}.")
-        return self._rows(a, views[a.bufferView], kind)
+        array = np.zeros((a.count, _WIDTHS[width]), _DTYPES[a.componentType])
+        if a.bufferView is not None:
+            array = self._rows(a, a.componentType, a.count, _WIDTHS[width], kind)
+        if a.sparse is not None:
+            few, ids = a.sparse.count, a.sparse.indices
+            at = self._rows(ids, ids.componentType, few, 1, kind).ravel()
+            array[at] = self._rows(a.sparse.values, a.componentType, few, _WIDTHS[width], kind)
+        whole = array.dtype.kind in "iu" and a.normalized
+        return array.astype(np.float64) / np.iinfo(array.dtype).max if whole else array
 
-    def _rows(self, accessor: Any, view: Any, kind: str) -> Any:
-        dtype, columns = np.dtype(_DTYPES[accessor.componentType]), _WIDTHS[accessor.type]
+    def _rows(self, place: Any, component: int, count: int, columns: int, kind: str) -> Any:
+        """The (count, columns) array at the view and offset that ``place`` names."""
+        view, dtype = self.document.bufferViews[place.bufferView], np.dtype(_DTYPES[component])
         row = columns * dtype.itemsize
         stride = view.byteStride or row
-        begin = (view.byteOffset or 0) + (accessor.byteOffset or 0)
-        end = begin + stride * (accessor.count - 1) + row
-        if accessor.count < 1 or begin < 0 or stride < row or end > len(self.blob):
+        begin = (view.byteOffset or 0) + (place.byteOffset or 0)
+        end = begin + stride * (count - 1) + row
+        if count < 1 or begin < 0 or stride < row or end > len(self.blob):
             raise MeshError(f"{self.file} must hold {end} bytes for {kind}, got {len(self.blob)}: "
                             "it is cut off; copy it again.")  # fmt: skip
-        array = np.ndarray((accessor.count, columns), dtype, self.blob, begin,
-                           (stride, dtype.itemsize))  # fmt: skip
-        whole = dtype.kind in "iu" and accessor.normalized
-        return array.astype(np.float64) / np.iinfo(dtype).max if whole else array.copy()
+        steps = (stride, dtype.itemsize)
+        return np.ndarray((count, columns), dtype, self.blob, begin, steps).copy()
 
 
 def template(document: Any, blob: bytes, file: Path) -> Template:
@@ -126,7 +131,8 @@ def _template(document: Any, reader: _Reader) -> Template:
     mesh, skin, primitive = _parts(document, reader.file)
     attributes = _dict(primitive.attributes)
     points = _lps(reader.array(attributes.get("POSITION"), "POSITION", "VEC3"))
-    n, bones, extras = len(points), _bones(document, skin, reader), mesh.extras["supple"]
+    n, extras = len(points), mesh.extras["supple"]
+    bones, order = _bones(document, skin, reader)
     triangles = reader.array(primitive.indices, "triangles", "SCALAR").astype(np.int64)
     shapes = [_lps(reader.array(target.get("POSITION"), "a morph target", "VEC3", n))
               for target in map(_dict, primitive.targets or [])]  # fmt: skip
@@ -135,7 +141,7 @@ def _template(document: Any, reader: _Reader) -> Template:
     mirror = np.array(extras["mirror"], dtype=np.int64)
     if mirror.shape != (n,):
         raise ValueError(f"mirror has shape {mirror.shape} for {n} vertices")
-    weights = _weights(attributes, len(bones), n, reader)
+    weights = _weights(attributes, len(bones), n, reader)[:, order]
     try:
         return Template(
             points, triangles.reshape(-1, 3), bones, weights, np.array(shapes).reshape(-1, n, 3),
@@ -173,22 +179,30 @@ def _lps(points: npt.NDArray[Any]) -> Floats:
     return np.asarray(points.astype(np.float64)[:, [0, 2, 1]] * (1, -1, 1))
 
 
-def _bones(document: Any, skin: Any, reader: _Reader) -> tuple[Bone, ...]:
-    """Names and parents from the nodes, joints from the bind pose, wherever the nodes stand."""
+def _bones(document: Any, skin: Any, reader: _Reader) -> tuple[tuple[Bone, ...], list[int]]:
+    """Names and parents from the nodes, joints from the bind pose, wherever the nodes stand.
+
+    They come in the order of BONES if they bear those names, else in the file's; beside them,
+    the number of each in the file.
+    """
     count = len(skin.joints)
     matrices = reader.array(skin.inverseBindMatrices, "inverse bind matrices", "MAT4", count)
     inverse = matrices.astype(np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
     if not (np.isfinite(inverse).all() and (abs(np.linalg.det(inverse)) > 1e-12).all()):
         raise MeshError(f"{reader.file} must hold bind matrices that can be inverted; {_AGAIN}.")
+    if not all(0 <= joint < len(document.nodes) for joint in skin.joints):
+        raise MeshError(f"{reader.file} must have a node for each bone; {_AGAIN}.")
+    names = [document.nodes[joint].name or f"bone_{joint}" for joint in skin.joints]
+    ours = [name for name, _ in BONES]
+    order = [names.index(n) for n in ours] if sorted(names) == sorted(ours) else [*range(count)]
+    joints = [skin.joints[k] for k in order]
     above = {child: k for k, node in enumerate(document.nodes) for child in node.children or ()}
     result = []
-    for joint, at in zip(skin.joints, _lps(np.linalg.inv(inverse)[:, :3, 3]), strict=True):
-        if not 0 <= joint < len(document.nodes):
-            raise MeshError(f"{reader.file} must have a node for each bone; {_AGAIN}.")
+    for k, at in zip(order, _lps(np.linalg.inv(inverse)[order, :3, 3]), strict=True):
         x, y, z = at.tolist()
-        parent = skin.joints.index(above[joint]) if above.get(joint) in skin.joints else -1
-        result.append(Bone(document.nodes[joint].name or f"bone_{joint}", parent, (x, y, z)))
-    return tuple(result)
+        up = above.get(skin.joints[k])
+        result.append(Bone(names[k], joints.index(up) if up in joints else -1, (x, y, z)))
+    return tuple(result), order
 
 
 def _weights(attributes: dict[str, Any], bones: int, n: int, reader: _Reader) -> Floats:

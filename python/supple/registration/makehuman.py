@@ -33,7 +33,7 @@ _HIPS = 0.05  #: height of the lower cut, m
 _NECK = np.array([(0.0, -0.025, 0.555), (0.0, -0.196, 0.981)])
 _ARM = 0.55  #: place of the cut between the joints of shoulder and elbow
 #: Where the breast begins: geometric mean of its bone's weight and of its move by a fuller cup.
-_OUTLINE = 0.2
+_OUTLINE = 0.25
 
 
 def torso(folder: Path, mpfb: Path | None = None, spacing: float = 0.0185) -> Template:
@@ -83,7 +83,7 @@ def _template(base: BaseMesh, woman: Floats, half: Half) -> Template:
         return np.asarray(means @ base.target(name))
 
     skin = draw.Skin(points, triangles, mirror)
-    weights = rig.weights(base, means, mirror)
+    weights = rig.weights(base, means, skin)
     of_bone = {name: weights[:, k] for k, (name, _) in enumerate(BONES)}
     full, nipple = (np.linalg.norm(target(name), axis=1) for name in (_FULL, _NIPPLE))
     breast = np.sqrt(full / full.max() * of_bone["breast_left"])

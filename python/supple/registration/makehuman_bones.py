@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration.makehuman_files import BaseMesh
+from supple.registration.makehuman_marks import Skin
+from supple.registration.makehuman_refine import laplacian
 from supple.registration.template import BONES, Bone
 
 Floats = npt.NDArray[np.float64]
@@ -23,26 +25,50 @@ _PARTS = {
     "arm_left": ("upperarm01.L", "upperarm02.L", "lowerarm01.L"),
     "breast_left": ("breast.L",),
 }  # fmt: skip
+#: Length over which weights are evened out, m.
+_EVEN = 0.01
+#: Largest weight of bones that the rig lets move nothing alone.
+_TOPS = {("shoulder_left", "shoulder_right"): 0.7, ("neck",): 1.0,
+         ("breast_left", "breast_right"): 1.0}  # fmt: skip
 #: Bone of the torso → the bone of the rig at whose head it turns.
 _HEADS = {"abdomen": "spine04", "chest": "spine02", "neck": "neck01",
           "shoulder_left": "clavicle.L", "arm_left": "upperarm01.L"}  # fmt: skip
 
 
-def weights(base: BaseMesh, means: Any, mirror: Ints) -> Floats:
+def weights(base: BaseMesh, means: Any, skin: Skin) -> Floats:
     """Weights (n, 9) at the vertices of the torso, in the order of BONES; rows sum to 1.
 
-    The rig shares the neck and the breasts with the chest even at their far ends; here both come
-    to 1 where the rig's own weight is largest, so that each of these bones moves something alone.
+    The rig's own are evened out over `_EVEN`: in the armpit they jump within a few mm. It shares
+    shoulders, neck and breasts with the chest even where they are strongest; here they come to
+    `_TOPS` there, so that a scan tells what each of these bones does.
     """
     rig = base.weights()
     left = {name: means @ sum(rig[part] for part in parts) for name, parts in _PARTS.items()}
-    whole = np.stack([_side(left, name, mirror) for name, _ in BONES], axis=1)
-    whole = np.clip(whole, 0.0, None)
-    for name in ("neck", "breast_left", "breast_right"):
-        _raise(whole, [bone for bone, _ in BONES].index(name))
-    whole = whole / whole.sum(axis=1, keepdims=True)
-    whole[whole < 1e-4] = 0.0
+    whole = np.stack([_side(left, name, skin.mirror) for name, _ in BONES], axis=1)
+    whole = np.clip(_evened(whole, skin), 0.0, None)
+    names = [name for name, _ in BONES]
+    for bones, top in _TOPS.items():
+        _raise(whole, [names.index(bone) for bone in bones], top)
+    whole[whole < 1e-3] = 0.0  # too small to see
     return np.asarray(whole / whole.sum(axis=1, keepdims=True))
+
+
+def _evened(values: Floats, skin: Skin) -> Floats:
+    """One implicit step of diffusion on the skin, (M + a² L) x = M values; the same both sides."""
+    from scipy import sparse
+    from scipy.sparse.linalg import spsolve
+
+    stiffness, mass = laplacian(skin.points, skin.triangles)
+    matrix = sparse.diags_array(mass) + _EVEN**2 * stiffness
+    result = spsolve(matrix.tocsc(), mass[:, None] * values)
+    swapped = [[name for name, _ in BONES].index(_other(name)) for name, _ in BONES]
+    return np.asarray((result + result[skin.mirror][:, swapped]) / 2)
+
+
+def _other(name: str) -> str:
+    """The bone of the other side, or the same."""
+    stem, _, side = name.rpartition("_")
+    return {"left": f"{stem}_right", "right": f"{stem}_left"}.get(side, name)
 
 
 def _side(left: dict[str, Floats], name: str, mirror: Ints) -> Floats:
@@ -52,13 +78,13 @@ def _side(left: dict[str, Floats], name: str, mirror: Ints) -> Floats:
     return own if name.endswith("_left") else (own + own[mirror]) / 2
 
 
-def _raise(whole: Floats, column: int) -> None:
-    """Scale a column so that its largest is 1, at the cost of all others in equal parts."""
+def _raise(whole: Floats, columns: list[int], top: float) -> None:
+    """Scale columns so that the largest is ``top``, at the cost of all others in equal parts."""
     whole /= np.maximum(whole.sum(axis=1, keepdims=True), 1e-12)
-    raised = whole[:, column] / whole[:, column].max()
-    others = 1 - whole[:, column]
-    whole *= ((1 - raised) / np.maximum(others, 1e-12))[:, None]
-    whole[:, column] = raised
+    raised = top * whole[:, columns] / whole[:, columns].max()
+    others = 1 - whole[:, columns].sum(axis=1)
+    whole *= (np.maximum(1 - raised.sum(axis=1), 0) / np.maximum(others, 1e-12))[:, None]
+    whole[:, columns] = raised
 
 
 def bones(base: BaseMesh, points: Floats, breast: Floats) -> tuple[Bone, ...]:

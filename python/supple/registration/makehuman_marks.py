@@ -147,7 +147,7 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
         "breast_lateral": skin.nearest(lateral),
         "breast_inferior": skin.nearest(around[around[:, 2].argmin()]),
     }
-    notch = _notch(skin)
+    notch = _notch(skin, float(skin.at(marks["nipple"])[0, 2]))
     end = xiphoid_height(float(notch[2]), float(around[:, 2].min()))
     result = {"sternal_notch": skin.nearest(notch),
               "xiphoid": skin.nearest(skin.profile(end, end, 1))}  # fmt: skip
@@ -156,14 +156,18 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
     return result
 
 
-def _notch(skin: Skin, window: float = 0.02) -> Floats:
-    """Where the profile turns most from the chest to the neck within ``window`` m of height."""
+def _notch(skin: Skin, below: float) -> Floats:
+    """Where the profile lies deepest behind its chord from the neck's cut to the height ``below``.
+
+    A spline through the profile's vertices, so that it does not depend on how fine they are.
+    """
+    from scipy.interpolate import CubicSpline
+
     line = skin.middle(front=True)
-    z = np.arange(np.quantile(line[:, 2], 0.5), line[-1, 2] - window, 1e-4)
-    angle = np.arctan(np.gradient(np.interp(z, line[:, 2], line[:, 1]), z))
-    steps = round(window / 1e-4)
-    turn = angle[steps:] - angle[:-steps]
-    height = float(z[int(np.argmin(turn)) + steps // 2])
+    depth = CubicSpline(line[:, 2], line[:, 1])
+    z = np.arange(below, line[-1, 2], 1e-4)
+    chord = np.interp(z, z[[0, -1]], depth(z[[0, -1]]))
+    height = float(z[int(np.argmax(depth(z) - chord))])
     return np.asarray(skin.profile(height, height, 1)[0])
 
 

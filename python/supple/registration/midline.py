@@ -14,7 +14,9 @@ Floats = npt.NDArray[np.float64]
 #: Axes of a view from the front: across (+x, the left), up, towards the viewer (-y).
 FRONT = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 #: m: symmetry shows in less detail than landmarks need.
-_PIXEL = 7e-3
+_PIXEL, _POINTS = 7e-3, 20_000
+#: A turn of less than this, rad, needs no further round.
+_STRAIGHT = np.radians(1.5)
 #: Tilts of the midline that are tried, degrees, and how far it may lie from the middle, m (sd).
 _TILTS, _MIDDLE = np.arange(-24, 25, 2), 0.05
 
@@ -37,18 +39,23 @@ def square_up(points: Floats) -> Midline:
     """Turn ``points`` (n, 3) m, about LPS, until the front is symmetric: tilt, yaw and shift."""
     R, t = np.eye(3), np.zeros(3)
     likeness = 0.0
+    points = points[:: max(1, len(points) // _POINTS)]
+    tilts, yaw, tilt = _TILTS, 1.0, 1.0
     for _ in range(3):
+        if max(abs(yaw), abs(tilt)) < _STRAIGHT:
+            break
         view = seen_along(points @ R.T + t, FRONT, _PIXEL)
-        tilt, shift, likeness = _axis(view)
+        tilt, shift, likeness = _axis(view, tilts)
         turn = _about_y(tilt)
         R, t = turn @ R, turn @ t - np.array([shift, 0, 0])
         yaw, depth = _yaw(seen_along(points @ R.T + t, FRONT, _PIXEL))
         turn = _about_z(yaw)
         R, t = turn @ R, turn @ (t - [0, depth, 0]) + [0, depth, 0]
+        tilts = _TILTS[np.abs(_TILTS) <= 8]
     return Midline(R, t, likeness)
 
 
-def _axis(view: HeightMap) -> tuple[float, float, float]:
+def _axis(view: HeightMap, tilts: npt.NDArray[np.int64]) -> tuple[float, float, float]:
     """Tilt (rad), place after it (m) of the line that mirrors the map best, and the likeness.
 
     Each row is convolved with itself: the peak is at twice the place of its mirror.
@@ -64,23 +71,25 @@ def _axis(view: HeightMap) -> tuple[float, float, float]:
     rows = np.arange(len(detail))
     _, up = view.place(rows, 0)
     middle = _middle(view)
+    place = view.low[0] + (np.arange(2 * columns) / 2 + 0.5) * view.pixel
+    sums = np.flatnonzero(np.abs(place - middle) < 3 * _MIDDLE)
+    across = place[sums]
     best = (-np.inf, 0.0, 0.0)
-    for degrees in _TILTS:
+    for degrees in tilts:
         slope = np.tan(np.radians(degrees))
         lean = 2 * slope * (up - up.mean()) / view.pixel
-        at = np.arange(2 * columns)[None, :] + lean[:, None]
+        at = sums[None, :] + lean[:, None]
         whole = np.floor(at).astype(np.int64)
         inside = (whole >= 0) & (whole < size)
         score = np.where(inside, match[rows[:, None], np.clip(whole, 0, size - 1)], 0.0).sum(axis=0)
         score /= power + 1e-12
-        across = view.low[0] + (np.arange(2 * columns) / 2 + 0.5) * view.pixel
         ranked = score - 0.5 * ((across - middle) / (3 * _MIDDLE)) ** 2 - (degrees / 60) ** 2
         k = int(np.argmax(ranked))
         if ranked[k] > best[0]:
             best = (float(ranked[k]), float(np.arctan(slope)), float(across[k]))
             likeness = float(score[k])
-    tilt, across = best[1], best[2]
-    foot = np.array([across, 0.0, float(up.mean())])
+    tilt = best[1]
+    foot = np.array([best[2], 0.0, float(up.mean())])
     return -tilt, float((_about_y(-tilt) @ foot)[0]), likeness
 
 

@@ -49,14 +49,17 @@ def _swell(u: float, v: float, radii: Sequence[float], height: float) -> Field:
 
 BREAST_SHAPES: dict[str, Field] = {
     "breast_size_left": _in_breast(
-        lambda q, r: (0.12 * q[:, 0] * r**0.5, 0.12 * q[:, 1] * r**0.5, 0.010 * r)),
-    "breast_projection_left": _in_breast(lambda q, r: (0.0, 0.0, 0.010 * r)),
+        lambda q, r: (0.16 * q[:, 0] * r**0.5, 0.16 * q[:, 1] * r**0.5, 0.014 * r**0.6)),
+    "breast_projection_left": _in_breast(lambda q, r: (0.0, 0.0, 0.012 * smooth(r / 1.2))),
     "breast_width_left": _in_breast(lambda q, _: (0.10 * q[:, 0], 0.0, 0.0)),
     "breast_height_left": _in_breast(lambda q, _: (0.0, 0.10 * q[:, 1], 0.0)),
     "breast_up_left": _in_breast(lambda q, r: (0.0, 0.010, 0.0)),
     "breast_lateral_left": _in_breast(lambda q, r: (0.008, 0.0, 0.0)),
     "breast_ptosis_left": _in_breast(
-        lambda q, r: (0.0, -0.014 * r**1.5, -0.003 * r)),
+        lambda q, r: (0.0, -0.018 * r**1.5, -0.003 * r)),
+    "breast_heavy_left": _in_breast(
+        lambda q, r: (0.10 * q[:, 0] * r, -0.010 * r, 0.016 * r * smooth(0.5 - q[:, 1] / 0.10))
+    ),
     "breast_sag_left": _in_breast(
         lambda q, r: (0.0, -0.010 * r * smooth(-q[:, 1] / 0.06), 0.004 * r)),
     "breast_turn_left": _in_breast(lambda q, r: (0.010 * r, 0.0, -0.15 * q[:, 0] * r)),

@@ -22,7 +22,7 @@ _RINGS = {
     "thorax": (0.085, (0, 40, 145, 180)),
     "girdle": (0.150, (150, 180)),
 }
-_RADIUS, _HEIGHT = 0.105, 0.006  # of a swelling, m
+_RADIUS, _HEIGHT = 0.105, 0.008  # of a swelling, m
 #: Places on the left arm: along it from the shoulder, m, and angles from its outside to its front.
 _ARM_PLACES = ((0.08, (0, 90, 270)), (0.16, (0, 90, 180, 270)))
 _ARM_RADIUS = 0.065

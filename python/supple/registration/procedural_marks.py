@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 
 #: Heights of the ends of the sternum, m: the lower is 0.9 of the way down to the breasts' folds.
 NOTCH, XIPHOID = 0.140, -0.049
-AXILLA = np.array([0.152, -0.012, 0.056])  #: near the left one, m
+AXILLA = (0.156, 0.054)  #: x and z of the left one, m: where arm and chest part in front
 _MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
 _MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
 
@@ -84,7 +84,9 @@ def _left_places() -> dict[str, Floats]:
     medial, lateral = level_with(line, nipple)
     return {
         "nipple_left": nipple[None],
-        "axilla_left": AXILLA[None],
+        "axilla_left": body.met(
+            np.array([[AXILLA[0], -0.2, AXILLA[1]]]), np.array([0.0, 1.0, 0.0])
+        ),
         "breast_medial_left": medial[None],
         "breast_inferior_left": line[[line[:, 2].argmin()]],
         "breast_lateral_left": lateral[None],

@@ -17,6 +17,7 @@ Ints = npt.NDArray[np.int64]
 
 ARM_END, NECK_END, WAIST_END = 0.170, 0.100, -0.300  #: cuts: along arm and neck, and a height, m
 _CELL = 0.010  # of marching cubes, m
+_ARMPIT = np.array([0.160, 0.015, 0.025])  # where weights change within few edges, m
 _LOW, _HIGH = (-0.17, -0.32), (0.15, 0.28)  # the box in y and z; x from 0 to 0.30
 
 
@@ -38,10 +39,7 @@ def skin(spacing: float) -> Skin:
         points, triangles = _clipped(points, triangles, height(points), normal)
     points = settled(points)
     points, triangles = _remeshed(points, triangles, spacing)
-    points = settled(points)
-    tip = body.nipple()
-    points[np.linalg.norm(points - tip, axis=1).argmin()] = tip
-    return _both_halves(points, triangles)
+    return _both_halves(_evened(settled(points), triangles), triangles)
 
 
 def sizes(points: Floats, spacing: float) -> Floats:
@@ -49,8 +47,9 @@ def sizes(points: Floats, spacing: float) -> Floats:
     q = (points - body.BREAST) @ body.BREAST_AXES.T
     far = np.linalg.norm(q / (0.085, 0.085, 0.085), axis=1)
     near = 1 / (1 + np.exp((far - 1.15) / 0.12))
+    near = np.maximum(near, 0.5 * np.exp(-((points - _ARMPIT) ** 2).sum(axis=1) / 0.05**2))
     tip = np.exp(-(((q[:, :2] - body.NIPPLE[:2]) ** 2).sum(axis=1) / 0.014**2)) * (q[:, 2] > 0)
-    return np.asarray(spacing * (1 - 0.42 * near) * (1 - 0.55 * tip))
+    return np.asarray(spacing * (1 - 0.47 * near) * (1 - 0.50 * tip))
 
 
 def _marched() -> tuple[Floats, Ints]:
@@ -152,6 +151,28 @@ def border(triangles: Ints) -> Ints:
         np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
     )
     return np.asarray(edges[first[count == 1]])
+
+
+def _evened(points: Floats, triangles: Ints) -> Floats:
+    """A vertex put on the nipple; the others, but for the border's, moved among their neighbours.
+
+    Three damped steps of Laplace's smoothing, each followed by the way back to the level set.
+    """
+    tip = body.nipple()
+    nearest = np.linalg.norm(points - tip, axis=1).argmin()
+    points[nearest] = tip
+    edges = np.unique(
+        np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0
+    )
+    a, b = np.vstack([edges, edges[:, ::-1]]).T
+    count = np.bincount(a, minlength=len(points))[:, None]
+    free = np.ones(len(points), dtype=bool)
+    free[border(triangles)] = free[nearest] = False
+    for _ in range(3):
+        summed = np.stack([np.bincount(a, x[b], len(points)) for x in points.T], axis=1)
+        points[free] += 0.5 * (summed / count - points)[free]
+        points = settled(points, 2)
+    return settled(points)
 
 
 def _both_halves(points: Floats, triangles: Ints) -> Skin:

@@ -17,11 +17,14 @@ Floats = npt.NDArray[np.float64]
 BOUND = 4.0
 #: Least and greatest coefficients of those that would fold the skin, or hollow a breast, earlier.
 _TIGHTER = {
-    "breast_size": (-2.5, 5.0),
+    "breast_size": (-2.0, 5.0),
     "breast_projection": (-2.5, 5.0),
+    "breast_heavy": (-2.5, 5.0),
     "axilla_front": (-4.0, 2.5),
-    "axilla_side": (-4.0, 2.5),
+    "axilla_side": (-4.0, 2.0),
     "arm_length": (-2.5, 4.0),
+    "chest_0": (-4.0, 2.5),
+    "chest_110": (-4.0, 3.0),
 }
 
 

@@ -12,18 +12,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError
+from supple.registration.body_prior import body_prior
 from supple.registration.initial_pose import Candidate, SearchSettings, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
+from supple.registration.offset import Offset, OffsetSettings, offset
 from supple.registration.posture import Posture
 from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
+from supple.registration.scan_pieces import main_pieces
 from supple.registration.template import Floats, Template
 from supple.registration.trust import Doubts, doubts
 from supple.registration.weights import Weights
@@ -52,7 +55,7 @@ class RegisterSettings:
     """How a scan is registered; lengths in m."""
 
     weights: Weights = Weights()
-    priors: Priors = field(default_factory=Priors)
+    priors: Priors | None = None  #: how bodies differ; `body_prior` of the template
     coarse: tuple[Stage, ...] = COARSE
     fine: tuple[Stage, ...] = FINE
     warm: tuple[Stage, ...] = WARM
@@ -62,6 +65,7 @@ class RegisterSettings:
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
     doubts: Doubts = Doubts()
+    offset: OffsetSettings | None = OffsetSettings()  #: None: bones and shapes alone
 
 
 def register(
@@ -98,7 +102,9 @@ def register(
     _check(scan)
     named = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
     rig = rig_of(template)
-    rig.set_scan(scan, voxel=keep.voxel)
+    _set_scan(rig, scan, keep)
+    if keep.priors is None:
+        keep = replace(keep, priors=body_prior(template))
     clock.stage("start")
     starts = _starts(rig, named, keep, start)
     clock.stage("coarse")
@@ -107,8 +113,10 @@ def register(
     first = tried[0].posture if tried else starts[0].posture
     stages = keep.fine if tried else keep.warm
     fit = _run(rig, first, stages, named, keep)
+    clock.stage("offset")
+    moved = _offset(rig, fit, keep)
     clock.stage("judge")
-    return _result(rig, scan, fit, tried, starts, keep, clock)
+    return _result(rig, scan, fit, moved, tried, starts, keep, clock)
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
@@ -125,7 +133,7 @@ class _Clock:
     """Seconds of each stage."""
 
     def __init__(self, progress: Callable[[str], None] | None) -> None:
-        self.progress, self.seconds, self.name = progress, {}, ""
+        self.progress, self.name = progress, ""
         self.begun = self.since = time.perf_counter()
         self.seconds: dict[str, float] = {}
 
@@ -149,6 +157,17 @@ def _check(scan: Surface) -> None:
                          "give the whole scan.")  # fmt: skip
     if not 0.1 <= size <= 4.0:
         raise InputError(f"scan must span 0.1 to 4 m, got {size:.4g} m; convert it to metres.")
+
+
+def _set_scan(rig: Rig, scan: Surface, keep: RegisterSettings) -> None:
+    """Thinned, and without the small pieces beside the body."""
+    rig.set_scan(scan, voxel=keep.voxel)
+    cloud = rig.cloud
+    points, normals = np.asarray(cloud.points), np.asarray(cloud.normals)
+    body = main_pieces(points, 1.9 * keep.voxel)
+    if not body.all():
+        given = normals[body] if cloud.oriented else None
+        rig.set_scan(Surface(points[body]), given, thin=False)
 
 
 def _starts(
@@ -182,15 +201,24 @@ def coarse_score(fit: RigFit, reach: float) -> float:
     return float(np.where(np.isfinite(fit.distance), fit.distance, reach).mean())
 
 
-def _result(rig: Rig, scan: Surface, fit: RigFit, tried: list[RigFit], starts: list[Candidate],
-            keep: RegisterSettings, clock: _Clock) -> Registration:  # fmt: skip
+def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
+    if keep.offset is None:
+        return Offset(np.zeros_like(fit.points), None, 0.0)
+    cloud = rig.cloud
+    return offset(
+        fit, rig.template.triangles, fit.scan_points, fit.scan_normals, cloud.oriented, keep.offset
+    )
+
+
+def _result(rig: Rig, scan: Surface, fit: RigFit, moved: Offset, tried: list[RigFit],
+            starts: list[Candidate], keep: RegisterSettings, clock: _Clock) -> Registration:  # fmt: skip
     covariance = fit.covariance()
     warnings = doubts(rig, fit, tried, starts, covariance, keep.doubts)
-    zero = np.zeros_like(fit.points)
     history = [value for one in [*tried[:1], fit] for value in one.history]
     return Registration(
-        rig.template, fit.posture, fit.points, scan, zero, covariance, zero[:, 0],
-        not warnings, warnings, clock.stop(), len(history), history, _reach(fit), fit,
+        rig.template, fit.posture, fit.points + moved.vectors, scan, moved.vectors,
+        moved.precision, covariance, not warnings, warnings, clock.stop(), len(history), history,
+        _reach(fit), fit,
     )  # fmt: skip
 
 

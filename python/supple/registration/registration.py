@@ -25,9 +25,9 @@ class Registration:
         template, posture: ``posed(template, posture) + offset`` are the points.
         points: (n, 3) m, the registered skin's vertices.
         scan: that was registered.
-        offset: (n, 3) m by which the skin leaves what bones and blendshapes can do; 0 if unused.
+        offset: (n, 3) m by which the skin leaves what bones and blendshapes can do.
+        offset_precision: (n, n) sparse, 1/m², of its size along the normals; None without it.
         covariance: (9K+A, 9K+A) of the unknowns, in the order of `Posture.stepped`.
-        offset_sd: (n,) m, of the shape that bones and blendshapes lack.
         trustworthy: no warning that makes the fit doubtful.
         warnings: one sentence each.
         seconds: of each stage and "total".
@@ -42,8 +42,8 @@ class Registration:
     points: Floats
     scan: Surface
     offset: Floats
+    offset_precision: Any
     covariance: Floats | None
-    offset_sd: Floats
     trustworthy: bool
     warnings: list[str]
     seconds: dict[str, float]
@@ -91,7 +91,15 @@ class Registration:
         if self.covariance is None:
             return np.full(len(self.points), np.nan)
         of_posture = Rig(self.template).vertex_sd(self.posture, self.covariance)
-        return np.asarray(np.hypot(of_posture, self.offset_sd))
+        return np.asarray(np.hypot(of_posture, self._offset_sd))
+
+    @property
+    def _offset_sd(self) -> Floats:
+        """(n,) m, over the three axes; of the displacement along the normal a third each."""
+        if self.offset_precision is None:
+            return np.zeros(len(self.points))
+        variance = np.diagonal(np.linalg.inv(self.offset_precision.toarray()))
+        return np.asarray(np.sqrt(variance / 3))
 
     @property
     def landmarks(self) -> dict[str, Floats]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,79 +12,23 @@ import numpy.typing as npt
 from supple.core import core
 from supple.errors import ConvergenceError, InputError
 from supple.registration.posture import Posture
+from supple.registration.rig_settings import (
+    COLD,
+    WARM,
+    Priors,
+    Stage,
+    priors_in_core,
+    stage_in_core,
+    weights_in_core,
+)
 from supple.registration.template import Template
 from supple.registration.weights import Weights
 from supple.surface import Surface
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
-Moves = Literal["rigid", "bones", "scales", "all"]
-_MOVES = ("rigid", "bones", "scales", "all")
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One step of the way from coarse to fine."""
-
-    moves: Moves = "all"  #: one body; bones; their scales too; the blend too
-    iterations: int = 10  #: at most
-    tolerance: float = 5e-5  #: m: it ends when no vertex moves further
-    reach: float = 30e-3  #: m: pairs further apart are none
-    loss: float = 8e-3  #: m: the residual that counts a quarter (Geman–McClure)
-    angle: float = 60.0  #: degrees between normals of a pair, at most
-    template_share: float = 0.3  #: of the data that looks from the template to the scan
-    point_share: float = 0.0  #: of point-to-point in that
-    every_vertex: int = 1  #: uses every so many vertices
-    every_point: int = 1  #: uses every so many points of the thinned scan
-
-
-#: From a pose that is a few cm and 20° off.
-COLD = (
-    Stage("rigid", 6, 2e-3, 0.12, 0.06, 75.0, 0.5, 0.05, 4, 8),
-    Stage("bones", 8, 2e-3, 0.10, 0.04, 75.0, 0.5, 0.03, 4, 6),
-    Stage("scales", 6, 1e-3, 0.08, 0.025, 70.0, 0.5, 0.02, 3, 4),
-    Stage("all", 8, 5e-4, 0.05, 0.015, 60.0, 0.4, 0.01, 2, 2),
-    Stage("all", 8, 1e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 1, 1),
-)
-#: The next frame of a moving scan.
-WARM = (
-    Stage("all", 2, 1e-3, 0.05, 0.02, 60.0, 0.5, 0.01, 3, 4),
-    Stage("all", 2, 2e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 2, 2),
-)
-
-
-@dataclass(frozen=True, eq=False)
-class Priors:
-    """Standard deviations that make the energy's terms dimensionless; None: its default.
-
-    Attributes:
-        noise: m, of the mean residual of a patch: scan noise that thinning leaves, and the shape
-            that the template lacks.
-        patch: m; data within patch × patch count as one observation however dense they are, as
-            neighbours' residuals share their cause.
-        scale: (K,) of s_k − s_parent, and of s − 1 for the root; 0.1.
-        joint: (K,) m of T_k(j_k) − T_parent(j_k); 1 mm: a joint is tight, and cheap to hold.
-        rotation: (K,) rad, of a bone against its parent; 0.5: only bones that see no data stay.
-        blend_mean, blend_covariance: (A,), (A, A) of a statistical prior; 0 and I: shapes are made
-            so that a coefficient of 1 is one standard deviation.
-        stiff_joints: joints hold exactly, by Lagrange multipliers.
-        convex: Σ α = 1 and α ≥ 0, as in the thesis, whose shapes are whole bodies. Ours are
-            offsets from the template, of both signs, and 0 of all is a body: off.
-        bounded: the blend stays within the template's bounds.
-        scale_bounds: of all scales.
-    """
-
-    noise: float = 2e-3
-    patch: float = 15e-3
-    scale: npt.ArrayLike | None = None
-    joint: npt.ArrayLike | None = None
-    rotation: npt.ArrayLike | None = None
-    blend_mean: npt.ArrayLike | None = None
-    blend_covariance: npt.ArrayLike | None = None
-    stiff_joints: bool = False
-    convex: bool = False
-    bounded: bool = True
-    scale_bounds: tuple[float, float] = (0.5, 2.0)
+__all__ = ["COLD", "WARM", "Priors", "Rig", "RigFit", "Stage"]
+_TERMS = ("data", "scale", "blendshape", "joint", "landmark", "rotation")
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +121,7 @@ class Rig:
         self,
         scan: Surface,
         normals: npt.ArrayLike | None = None,
-        voxel: float = 10e-3,
+        voxel: float = 12e-3,
         thin: bool = True,
     ) -> None:
         """The scan of the fits to come.
@@ -219,14 +163,20 @@ class Rig:
         chosen, named = priors or Priors(), landmarks or {}
         try:
             found = self._fit.run(
-                *_arrays(start), _weights(weights or Weights()),
-                _priors(chosen, self.template), [_stage(stage) for stage in stages],
+                *_arrays(start), weights_in_core(weights or Weights()),
+                priors_in_core(chosen, self.template), [stage_in_core(stage) for stage in stages],
                 *self._landmarks(named, landmark_sd),
             )  # fmt: skip
         except core().Error as error:
             kind = ConvergenceError if "pairs" in str(error) else InputError
             raise kind(str(error)) from None
         return self._result(found, chosen)
+
+    def land(self, posture: Posture, points: npt.ArrayLike) -> tuple[Ints, Floats, Floats]:
+        """Where points (m, 3) m land: triangle (m,), barycentric (m, 3), distance (m,) m."""
+        asked = np.ascontiguousarray(points, dtype=np.float64)
+        triangle, barycentric, distance = self._fit.land(*_arrays(posture), asked)
+        return triangle.astype(np.int64), barycentric, distance
 
     def _landmarks(
         self, named: Mapping[str, npt.ArrayLike], sd: float | Mapping[str, float]
@@ -247,10 +197,10 @@ class Rig:
 
     def _result(self, found: Any, priors: Priors) -> RigFit:
         posture, scan = Posture(*found.posture), self._fit.scan
-        terms = ("data", "scale", "blendshape", "joint", "landmark", "rotation")
+        energy = {name: getattr(found.terms, name) for name in _TERMS}
         return RigFit(
             posture, self.vertices(posture), found.converged, found.last_step, found.iterations,
-            found.history, found.stage_seconds, {name: getattr(found.terms, name) for name in terms},
+            found.history, found.stage_seconds, energy,
             found.data_matrix, found.prior_matrix, found.patch_sd, found.residual_sd,
             found.observations, scan.points, scan.normals, found.triangle.astype(np.int64),
             found.barycentric, found.distance, found.used, found.vertex_used, priors.noise,
@@ -259,32 +209,3 @@ class Rig:
 
 def _arrays(posture: Posture) -> tuple[Floats, Floats, Floats, Floats]:
     return posture.rotations, posture.translations, posture.scales, posture.blend
-
-
-def _stage(stage: Stage) -> Any:
-    made = core().RigStage()
-    for name, value in vars(stage).items():
-        setattr(made, name, _MOVES.index(value) if name == "moves" else value)
-    return made
-
-
-def _weights(weights: Weights) -> Any:
-    made = core().RigWeights()
-    for name, value in vars(weights).items():
-        setattr(made, name, value)
-    return made
-
-
-def _priors(priors: Priors, template: Template) -> Any:
-    made = core().RigPriors()
-    for name in ("noise", "patch", "stiff_joints", "convex"):
-        setattr(made, name, getattr(priors, name))
-    for name in ("scale", "joint", "rotation", "blend_mean"):
-        if getattr(priors, name) is not None:
-            setattr(made, name, np.asarray(getattr(priors, name), dtype=np.float64))
-    if priors.blend_covariance is not None:
-        made.blend_precision = np.linalg.inv(np.asarray(priors.blend_covariance, dtype=np.float64))
-    if priors.bounded:
-        made.blend_lower, made.blend_upper = template.blendshape_bounds.T
-    made.scale_lower, made.scale_upper = priors.scale_bounds
-    return made

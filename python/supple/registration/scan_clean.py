@@ -19,6 +19,7 @@ from supple.surface import Surface, flat
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 #: Least number of points of a scan, and largest share of them that may be no numbers.
 LEAST, LOST = 200, 0.01
@@ -26,8 +27,9 @@ LEAST, LOST = 200, 0.01
 _EXTENT = (0.1, 3.0)
 #: Points closer than this are one, m: the least step that files of four decimals of a mm hold.
 _WELD = 1e-7
-#: |∫ n·(x - c) dA| over area and size above which it is sure which side is outside.
-_SURE = 0.05
+#: -∫ n·(x - c) dA over ∫ |x - c| dA above which a scan, or against it a large piece, faces inward,
+#: and the share of the area that a large piece has.
+_SURE, _ODD, _LARGE = 0.05, 0.3, 0.15
 
 
 def tidy(points: npt.ArrayLike, triangles: npt.ArrayLike, source: str = "the scan") -> tuple[
@@ -88,11 +90,13 @@ def clean(surface: Surface) -> tuple[Surface, list[str]]:
     if len(triangles):
         triangles, more = _mended(points, triangles)
         said += more
+    same = points is surface.points and triangles is surface.triangles
+    if len(triangles) and not same:
         points, triangles = _used(points, triangles)
     if len(points) < LEAST:
         raise InputError(f"the scan holds {len(points)} different points, fewer than the {LEAST} "
                          "of any torso; give the whole scan.")  # fmt: skip
-    if not said:
+    if same:
         return surface, said
     return Surface(points, triangles), said
 
@@ -113,10 +117,10 @@ def _mended(points: Floats, triangles: Ints) -> tuple[Ints, list[str]]:
                     f"{int(keep.sum())} of {len(keep)} triangles.")  # fmt: skip
         triangles, middle, normal = triangles[keep], middle[keep], normal[keep]
     piece = of[triangles[:, 0]]
-    sides, area = _outwardness(middle, normal, piece, count)
-    if (sides[area > 0.05 * area.sum()] < -_SURE).any():
+    flip, area = _inward(middle, normal, piece, count)
+    if flip.any():
         said.append("The triangles faced inward: turned inside out.")
-        triangles = turned(triangles, (sides < -_SURE)[piece])
+        triangles = turned(triangles, flip[piece])
     share, several = float(area.max() / area.sum()), int((area > 0).sum())
     if several > 1 and share < 0.98:
         said.append(f"The scan is in {several} pieces; the largest is {share:.0%} of its area.")
@@ -137,23 +141,22 @@ def _middles(points: Floats, triangles: Ints) -> tuple[Floats, Floats]:
     return middle.T, normal.T
 
 
-def _outwardness(middle: Floats, normal: Floats, of: Ints, count: int) -> tuple[Floats, Floats]:
-    """Of each piece, whether its normals point outward (> 0) or inward, and its area (m²).
+def _inward(middle: Floats, normal: Floats, of: Ints, count: int) -> tuple[Mask, Floats]:
+    """Which pieces face inward, and the area (m²) of each.
 
-    ∫ n·(x - c) dA over its area and size, where c is the middle of the piece: for a closed piece
-    three times its volume, and of the right sign for an open one that bulges, as each side of a
-    body does.
+    ∫ n·(x - c) dA is, of a closed surface, three times its volume, and of the right sign for an
+    open one that bulges, as each side of a body does. The scan votes as a whole, because a small
+    piece need not bulge; only a large one that clearly differs from the whole is turned by itself.
     """
     area = np.sqrt(np.einsum("td,td->t", normal, normal))
+    arm = middle - area @ middle / area.sum()
+    flow = np.bincount(of, np.einsum("td,td->t", normal, arm), count)
+    reach = np.bincount(of, area * np.sqrt(np.einsum("td,td->t", arm, arm)), count)
     total = np.bincount(of, area, count)
-    safe = np.maximum(total, 1e-30)
-    first = np.stack([np.bincount(of, area * m, count) for m in middle.T], 1) / safe[:, None]
-    flux = np.stack([np.bincount(of, n, count) for n in normal.T], 1)
-    flow = np.bincount(of, np.einsum("td,td->t", normal, middle), count)
-    flow -= np.einsum("pd,pd->p", flux, first)
-    second = np.bincount(of, area * np.einsum("td,td->t", middle, middle), count) / safe
-    size = np.sqrt(np.maximum(second - np.einsum("pd,pd->p", first, first), 1e-30))
-    return np.asarray(flow / (safe * size)), np.asarray(total, dtype=np.float64)
+    whole = -1.0 if flow.sum() < -_SURE * reach.sum() else 1.0
+    odd = whole * flow < -_ODD * reach
+    odd &= total > _LARGE * total.sum()
+    return np.asarray(odd ^ (whole < 0)), np.asarray(total, dtype=np.float64)
 
 
 def turned(triangles: Ints, flip: npt.NDArray[np.bool_]) -> Ints:

@@ -33,7 +33,10 @@ def write_template(template: Template, path: str | Path) -> Path:
 
 
 def read_template(path: str | Path) -> Template:
-    """Read what `write_template` wrote; ``.gltf`` only with its numbers inside.
+    """Read what `write_template` wrote, or what Blender made of it with custom properties kept.
+
+    ``.gltf`` only with its numbers inside. Bones come in the order of BONES, joints from the bind
+    pose. Vertices and triangles must keep their order, which landmarks and mirror count in.
 
     Raises:
         InputError: no such file, no glTF 2.0, or one without a template's skin or drawing.

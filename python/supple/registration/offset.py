@@ -1,0 +1,115 @@
+"""What bones and blendshapes cannot reach: a smooth displacement of the skin along its normals.
+
+h (n,) m minimises Σ w (n·(x + h n − p))² + hᵀ Q h. Q is the precision of a smooth random field on
+the skin with a standard deviation and a length of correlation, so where no scan is, h returns to 0
+and its uncertainty to the prior's.
+
+Source: Lindgren, Rue, Lindström (2011), J. R. Statist. Soc. B 73, eqs. 2–10 (Matérn, ν = 1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from supple.registration.pose_presets import vertex_normals
+from supple.registration.rig import RigFit
+from supple.registration.template import Floats, Ints
+from supple.surface import Surface
+
+
+@dataclass(frozen=True)
+class OffsetSettings:
+    """Lengths in m."""
+
+    length: float = 0.08  #: over which the displacement is correlated (to about 0.14)
+    least: float = 3e-4  #: its standard deviation, at least
+    most: float = 6e-3  #: and at most; between them, what the fit leaves on patches of skin
+    noise: float = 1.5e-3  #: of a patch
+    patch: float = 15e-3  #: its side
+    rounds: int = 3  #: of new partners
+    reach: float = 25e-3  #: partners further away are none
+    rms_said: float = 2e-3  #: a displacement that is larger on the whole is said
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """Displacement (n, 3) m, its precision (n, n) sparse, 1/m², and its prior sd, m."""
+
+    vectors: Floats
+    precision: Any
+    prior: float
+
+
+def offset(
+    fit: RigFit, triangles: Ints, points: Floats, normals: Floats, oriented: bool,
+    settings: OffsetSettings,
+) -> Offset:  # fmt: skip
+    """The displacement that brings the fitted skin to the scan's points (c, 3) m."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    prior = float(np.clip(fit.patch_sd, settings.least, settings.most))
+    skin = fit.points
+    along = vertex_normals(skin, triangles)
+    Q = matern(skin, triangles, prior, settings.length)
+    h = np.zeros(len(skin))
+    precision = Q
+    area = Surface(skin, triangles).areas.sum() * (fit.vertex_used > 0).mean()
+    one = area / max((fit.used > 0.1).sum(), 1) / (settings.patch * settings.noise) ** 2
+    for k in range(settings.rounds):
+        B, r, w = _rows(skin, along, h, triangles, points, normals, oriented, settings, prior)
+        weighted = B.T.multiply(one * w).tocsr()
+        precision = csc_array(Q + weighted @ B)
+        h = splu(precision, permc_spec="MMD_AT_PLUS_A",
+                 options={"SymmetricMode": True}).solve(weighted @ r)  # fmt: skip
+        del k
+    return Offset(h[:, None] * along, precision, prior)
+
+
+def _rows(skin: Floats, along: Floats, h: Floats, triangles: Ints, points: Floats,
+          normals: Floats, oriented: bool, settings: OffsetSettings,
+          prior: float) -> tuple[Any, Floats, Floats]:  # fmt: skip
+    """Of each scan point with a partner: its row of B (c, n), where it wants h, its weight."""
+    from scipy.sparse import csr_array
+
+    at = skin + h[:, None] * along
+    hit = Surface(at, triangles).closest(points)
+    corners, share = triangles[hit.triangle], np.asarray(hit.barycentric)
+    normal = np.einsum("kc,kcd->kd", share, along[corners])
+    signed = np.einsum("kd,kd->k", normal, points - np.asarray(hit.point))
+    cosine = np.einsum("kd,kd->k", normal, normals)
+    known = (normals != 0).any(axis=1)
+    cosine = np.where(known, cosine if oriented else np.abs(cosine), 1.0)
+    aside = np.sqrt(np.maximum(np.asarray(hit.distance) ** 2 - signed**2, 0))
+    good = (np.asarray(hit.distance) < settings.reach) & (cosine > 0.5) & (aside < 3e-3)
+    loss = max(4 * prior, 4e-3)
+    weight = good / (1 + (signed / loss) ** 2) ** 2
+    keep = np.flatnonzero(weight > 1e-3)
+    rows = np.repeat(np.arange(len(keep)), 3)
+    B = csr_array((share[keep].ravel(), (rows, corners[keep].ravel())), (len(keep), len(skin)))
+    return B, B @ h + signed[keep], weight[keep]
+
+
+def matern(points: Floats, triangles: Ints, sd: float, length: float) -> Any:
+    """Precision (n, n), 1/m², of a field on a surface of ``sd`` m, correlated over ``length`` m.
+
+    Q = τ² (κ² M + G) M⁻¹ (κ² M + G), M the lumped mass, G the stiffness, κ = √8 / length,
+    τ² = 1 / (4π κ² sd²).
+    """
+    from scipy.sparse import csr_array, dia_array
+
+    n, kappa = len(points), np.sqrt(8.0) / length
+    corner = points[triangles]
+    edge = corner[:, [2, 0, 1]] - corner[:, [1, 2, 0]]  # opposite to each corner
+    twice = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
+    dots = np.einsum("tid,tjd->tij", edge, edge) / (2 * np.maximum(twice, 1e-12))[:, None, None]
+    rows, columns = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
+    G = csr_array((dots.ravel(), (rows, columns)), (n, n))
+    mass = np.bincount(triangles.ravel(), np.repeat(twice / 6, 3), n)
+    mass = np.maximum(mass, 1e-3 * mass.mean())
+    M, inverse = (dia_array((m[None], [0]), (n, n)) for m in (mass, 1 / mass))
+    K = (kappa**2 * M + G).tocsr()
+    return K @ inverse @ K / (4 * np.pi * kappa**2 * sd**2)
