@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError
-from supple.registration.portrait import INK, MARK, PEN, skin_colours
+from supple.registration.portrait import INK, MARK, PEN, needs_head, skin_colours
 from supple.registration.skin import vertex_normals
 from supple.registration.template import Template
 
@@ -116,7 +116,7 @@ def _drawn(axes: Any, template: Template, view: Floats, title: str) -> None:
         if place.closed:
             flat = np.vstack([flat, flat[:1]])
         axes.plot(*flat.T, color=PEN, linewidth=1.8)
-        if "arrow" in name and np.isfinite(flat[-2:]).all():
+        if needs_head(name, at) and np.isfinite(flat[-2:]).all():
             axes.annotate("", flat[-1], flat[-2],
                           arrowprops={"arrowstyle": "-|>", "color": PEN})  # fmt: skip
     for place in template.landmarks.values():
