@@ -1,4 +1,4 @@
-"""A template whose measures are known: two bumps on a chest that is a plane or a parabolic cylinder."""
+"""A template whose measures are known: two bumps on a plane or a parabolic cylinder."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def plate(
 ) -> Template:
     """A sheet that faces the front, with ``cells`` squares along x, bumps, curvature ``bend`` 1/m.
 
-    The bend is that of a parabolic cylinder along z: y = bend x² / 2. The two blendshapes add a tenth
-    of a bump's height each.
+    The bend is that of a parabolic cylinder along z: y = bend x² / 2. The two
+    blendshapes add a tenth of a bump's height each.
     """
     nx, nz = cells, round(cells * HEIGHT / WIDTH)
     x = np.linspace(-WIDTH / 2, WIDTH / 2, nx + 1)
@@ -88,7 +88,8 @@ def _template(
     down = np.linspace(0.1, 0.0, 20)[:, None] * [0, 1]
     curves = {"breast_left": front(circle + CENTRES[0], True),
               "breast_right": front(circle + CENTRES[1], True),
-              "sternum_arrow_upper": front(down), "sternum_arrow_lower": front(down - [0, 0.08])}  # fmt: skip
+              "sternum_arrow_upper": front(down),
+              "sternum_arrow_lower": front(down - [0, 0.08])}  # fmt: skip
     inside = {f"breast_{side}": np.hypot(*(points[:, [0, 2]] - centre).T) < RADIUS
               for side, centre in zip(("left", "right"), CENTRES, strict=True)}  # fmt: skip
     none = np.zeros(len(points), dtype=bool)

@@ -170,7 +170,9 @@ def test_a_standard_deviation_is_the_blendshapes_times_its_slope(torso):
     covariance[-2, -2] = 0.5**2
     rest = Posture.rest(torso)
     found = measured(torso, rest, torso.points, covariance)
-    assert found.of("volume", "left").sd == pytest.approx(0.5e6 * 1.3 * SMOOTH_VOLUME / 10, rel=0.02)
+    assert found.of("volume", "left").sd == pytest.approx(
+        0.5e6 * 1.3 * SMOOTH_VOLUME / 10, rel=0.02
+    )
     assert found.of("volume", "right").sd == pytest.approx(0, abs=1e-9)
     ahead = 0.5e3 * 1.3 * HEIGHT / 10 / np.hypot(1, 3.0 * 0.08)  # across the chest's slope
     assert found.of("projection", "left").sd == pytest.approx(ahead, rel=0.01)

@@ -13,6 +13,9 @@ from supple.registration.transfer import Carried, Transfer
 
 from .plate import HEIGHT, WIDTH, cap, plate
 
+#: m, out of reach.
+AHEAD = np.array([0, 0.05, 0])
+
 
 @pytest.fixture(scope="module")
 def torso():
@@ -78,14 +81,15 @@ def test_over_a_hole_and_out_of_reach_points_stay_on_the_skin_and_say_so(torso):
     assert not there.on_scan[inside].any()
     assert np.array_equal(there.points[~there.on_scan], at[~there.on_scan])
     assert there.on_scan[np.abs(at[:, 0]) > 0.05].all()
-    far = Transfer(torso, torso.points, Surface(torso.points + [0, -0.05, 0], torso.triangles))
+    far = Transfer(torso, torso.points, Surface(torso.points - AHEAD, torso.triangles))
     assert not far.to_scan(places).on_scan.any()
     values, known = far.map_to_scan(torso.points)
-    assert not known.any() and np.isnan(values).all()
+    assert not known.any()
+    assert np.isnan(values).all()
 
 
 def test_a_sheet_that_faces_the_other_way_is_not_the_skin(torso):
-    behind = Surface(torso.points + [0, 5e-3, 0], torso.triangles[:, ::-1])
+    behind = Surface(torso.points + AHEAD / 10, torso.triangles[:, ::-1])
     assert not Transfer(torso, torso.points, behind).to_scan(moved_places(torso)).on_scan.any()
 
 
@@ -146,7 +150,7 @@ def lines():
 
 
 def test_ply_holds_the_edges_in_mm(lines, tmp_path):
-    """Read by hand, as the header says: a closed line of 4 points has 4 edges, an open one of 3, 2."""
+    """Read by hand, as the header says: a closed line of 4 points has 4 edges."""
     text = write_lines(tmp_path / "d.ply", lines).read_text().splitlines()
     end = text.index("end_header")
     head = text[:end]
@@ -171,8 +175,7 @@ def test_obj_holds_polylines_in_mm(lines, tmp_path):
 def test_glb_holds_lines_that_stand_upright_in_metres(lines, tmp_path):
     """Read by trimesh, which applies the root's matrix: y up, +z to the front, m."""
     scene = trimesh.load(write_lines(tmp_path / "d.glb", lines))
-    paths = {name: part for name, part in zip(
-        scene.graph.nodes_geometry, scene.dump(), strict=True)}  # fmt: skip
+    paths = dict(zip(scene.graph.nodes_geometry, scene.dump(), strict=True))
     loop = next(part for name, part in paths.items() if "loop" in name)
     expected = SQUARE[:, [0, 2, 1]] * [1, 1, -1]
     assert loop.length == pytest.approx(0.4, rel=1e-6)

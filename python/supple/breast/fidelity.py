@@ -12,7 +12,6 @@ from scipy import ndimage, spatial
 from supple.breast.facets import (
     FACES,
     boundary_facets,
-    connected,
     enclosed_volume,
     euler_number,
     facet_areas,
@@ -21,6 +20,7 @@ from supple.breast.facets import (
 from supple.breast.grid import signed_distance, voxel_coordinates
 from supple.breast.region import breast_region
 from supple.breast.surface import mean_ratios, signed_volumes
+from supple.tetrahedra import connected
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

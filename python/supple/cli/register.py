@@ -56,7 +56,8 @@ def register(
     """
     if study:
         _no_others("--study", scan, template, landmarks, unit, start)
-        return _study(run, samples or 3, data)
+        _study(run, samples or 3, data)
+        return
     _no_others("a scan without --study", samples, data)
     if scan is None:
         raise InputError("SCAN is missing; give the file of a surface scan, or --study.")

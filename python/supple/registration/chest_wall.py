@@ -1,6 +1,6 @@
 """A chest wall behind both breasts, continued from the skin around them.
 
-    skin around the outlines ─► thin plate ─► soap film from it to the rim ─► weights of the skin
+skin around the outlines ─► thin plate ─► soap film from it to the rim ─► weights of the skin
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ def stretched(template: Template, cut: Cut, support: Ints) -> tuple[Ints, Floats
 
 def around(template: Template, cut: Cut) -> Ints:
     """Vertices beside outlines, of the trunk, that face as the cut does, outside of both breasts.
+
     AROUND is how far from them.
     """
     nearest = np.min([cut_along(template, f"breast_{side}", f"nipple_{side}").distance

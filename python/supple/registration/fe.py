@@ -1,7 +1,7 @@
 """From a fit to finite elements: the front of the torso, closed by a chest wall, as tetrahedra.
 
-    skin around both breasts ─► chest wall behind it ─► closed surface ─► signed distance
-    ─► lattice cut along its zero, remeshed (supple.tetrahedra) ─► facets tagged by what they face
+skin around both breasts ─► chest wall behind it ─► closed surface ─► signed distance
+─► lattice cut along its zero, remeshed (supple.tetrahedra) ─► facets tagged by what they face
 """
 
 from __future__ import annotations
@@ -155,4 +155,4 @@ def _signed_distance(surface: Surface, places: Floats) -> Floats:
 
     distance = surface.closest(places).distance
     inside = windings(surface.points, surface.triangles, places) > 0
-    return np.where(inside, -distance, distance)
+    return np.asarray(np.where(inside, -distance, distance))

@@ -45,7 +45,9 @@ def _pairs(line: Carried, start: int = 0) -> list[tuple[int, int]]:
 
 
 def _ply(lines: Mapping[str, Carried]) -> bytes:
-    vertices, edges, comments = [], [], [*_SAID]
+    vertices: list[str] = []
+    edges: list[str] = []
+    comments = [*_SAID]
     for name, line in lines.items():
         last = len(vertices) + len(line.points) - 1
         comments.append(f"line {name} vertices {len(vertices)} to {last}")
@@ -73,17 +75,16 @@ def _glb(lines: Mapping[str, Carried]) -> bytes:
     import pygltflib as g
 
     said = dict(part.split() for part in _SAID)
+    root = g.Node(name="drawing", matrix=_GLTF_FROM_LPS_MM, extras=said, children=[])
     whole = g.GLTF2(asset=g.Asset(generator="Supple", extras=said), scene=0,
-                    scenes=[g.Scene(nodes=[0])],
-                    nodes=[g.Node(name="drawing", matrix=_GLTF_FROM_LPS_MM, extras=said)])  # fmt: skip
+                    scenes=[g.Scene(nodes=[0])], nodes=[root])  # fmt: skip
     blob = b""
-    whole.nodes[0].children = []
     for number, (name, line) in enumerate(lines.items()):
         blob += _add(whole, line, len(blob))
         lone = g.Primitive(attributes=g.Attributes(POSITION=number), mode=1)
         whole.meshes.append(g.Mesh(name=name, primitives=[lone]))
         whole.nodes.append(g.Node(name=name, mesh=number))
-        whole.nodes[0].children.append(number + 1)
+        root.children.append(number + 1)
     whole.buffers.append(g.Buffer(byteLength=len(blob)))
     whole.set_binary_blob(blob)
     return b"".join(whole.save_to_bytes())
@@ -103,4 +104,4 @@ def _add(whole: Any, line: Carried, start: int) -> bytes:
         bufferView=len(whole.bufferViews) - 1, componentType=g.FLOAT, count=len(ends), type=g.VEC3,
         min=ends.min(axis=0).tolist(), max=ends.max(axis=0).tolist(),
     ))  # fmt: skip
-    return ends.tobytes()
+    return bytes(ends.tobytes())

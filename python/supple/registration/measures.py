@@ -217,7 +217,9 @@ class _Breast:
         normal, _ = base_plane(rim)
         along = _unit(_across(up, normal))
         across = np.cross(along, normal)
-        return tuple(np.ptp(np.einsum("sbd,sd->sb", rim, axis), axis=1) for axis in (across, along))  # type: ignore[return-value]
+        wide, high = (np.ptp(np.einsum("sbd,sd->sb", rim, axis), axis=1)
+                      for axis in (across, along))  # fmt: skip
+        return wide, high
 
     def _behind(self, points: Floats) -> OnSurface:
         """The place of the chest wall that is closest to the nipple."""
@@ -245,4 +247,4 @@ def _unit(vectors: Floats) -> Floats:
 
 def _across(vectors: Floats, axis: Floats) -> Floats:
     """The part of vectors (s, 3) across unit vectors (s, 3)."""
-    return vectors - np.einsum("sd,sd->s", vectors, axis)[:, None] * axis
+    return np.asarray(vectors - np.einsum("sd,sd->s", vectors, axis)[:, None] * axis)

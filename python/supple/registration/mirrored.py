@@ -40,13 +40,13 @@ class Mirrored:
         if self._pairs is None:
             self._pairs = [self._paired(patch, at[0], left[0], middle[0])
                            for patch in self._patches]  # fmt: skip
-        squares = 0.0
+        squares: Floats = np.zeros(len(at))
         for pairs in self._pairs:
             mirrored = _reflected(pairs.patch.skin_points(at), left, middle)
             on = np.einsum("qc,sqcd->sqd", pairs.weights, at[:, pairs.corners])
             off = np.einsum("sqd,qd->sq", mirrored - on, pairs.away)
             squares = squares + off**2 @ pairs.share / 2
-        return np.sqrt(squares)
+        return np.asarray(np.sqrt(squares))
 
     def _paired(self, patch: BreastPatch, at: Floats, left: Floats, middle: Floats) -> _Pairs:
         from supple.surface import Surface

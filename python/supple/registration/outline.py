@@ -1,6 +1,6 @@
 """The part of a template inside of a closed curve on it: triangles cut where the curve passes.
 
-    curve ─► distance of each vertex, negative inside ─► edges cut at its zero ─► smaller triangles
+curve ─► distance of each vertex, negative inside ─► edges cut at its zero ─► smaller triangles
 """
 
 from __future__ import annotations

@@ -86,6 +86,14 @@ def skin_colours() -> Any:
     return LinearSegmentedColormap.from_list("skin", _SKIN)
 
 
+def needs_head(name: str, points: Floats) -> bool:
+    """Whether a curve is an arrow that is drawn without barbs: straight to its end."""
+    if "arrow" not in name or len(points) < 8:
+        return False
+    far = np.linalg.norm(points[-1] - points[0])
+    return bool(far > 0.9 * np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
 def _flat(points: Floats, frame: Floats) -> Floats:
     """Across and up (…, 2), mm."""
     return np.asarray(1e3 * points @ frame[[0, 2]].T)
@@ -101,7 +109,7 @@ def _scan(axes: Any, portrait: Portrait, low: Floats, high: Floats) -> None:
     scan, frame = portrait.scan, portrait.frame
     flat, depth = _flat(scan.points, frame), scan.points @ frame[1]
     colours = skin_colours()
-    inside = ((flat > low) & (flat < high)).all(axis=1)
+    inside = np.asarray((flat > low) & (flat < high)).all(axis=1)
     if not len(scan.triangles):
         shown = np.flatnonzero(inside)
         shown = shown[np.argsort(depth[shown])]
@@ -122,14 +130,14 @@ def _drawing(axes: Any, portrait: Portrait) -> None:
     """Curves, thin and dotted where they are on no scan; landmarks with their names."""
     for name, curve in portrait.curves.items():
         flat = _flat(curve.points, portrait.frame)
-        on = curve.on_scan
+        on: Any = curve.on_scan
         if curve.closed:
             flat, on = np.vstack([flat, flat[:1]]), np.append(on, on[:1])
         off = np.where(on[:, None], np.nan, flat)
         axes.plot(*off.T, color=PEN, linewidth=1.2, linestyle=":")
         axes.plot(*np.where(on[:, None], flat, np.nan).T, color=PEN, linewidth=2.6,
                   solid_capstyle="round")  # fmt: skip
-        if "arrow" in name and len(flat) > 8:
+        if needs_head(name, curve.points):
             axes.annotate("", flat[-1], flat[-8], arrowprops={
                 "arrowstyle": "-|>", "color": PEN, "mutation_scale": 26, "shrinkA": 0, "shrinkB": 0,
                 "lw": 0})  # fmt: skip

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError
+from supple.registration import uncertainty
 from supple.registration.body_prior import body_prior
 from supple.registration.initial_pose import Candidate, SearchSettings, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
@@ -62,6 +63,11 @@ class RegisterSettings:
     search: SearchSettings = SearchSettings()
     voxel: float = 10e-3  #: the scan is thinned to one point a voxel
     landmark_sd: float = 5e-3  #: of landmarks that are given
+    unlike: float = 8e-3  #: noise of a patch for a body unlike any that the template can become
+    follows: float = 1.5e-3  #: patches' sd after a loose fit, below which the body is like that
+    sure: float | None = None  #: landmarks found with less confidence are not used; None: none are
+    found_sd: float = 8e-3  #: of a landmark that is found for certain
+    found_reach: float = 50e-3  #: a landmark found further from the coarse fit is not used
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
     doubts: Doubts = Doubts()
@@ -109,10 +115,13 @@ def register(
     starts = _starts(rig, named, keep, start)
     clock.stage("coarse")
     tried = [] if start is not None else _coarse(rig, starts, named, keep)
-    clock.stage("fine")
+    clock.stage("landmarks")
     first = tried[0].posture if tried else starts[0].posture
+    marks, sds = found_landmarks(scan, rig, first, named, keep) if tried else (
+        named, dict.fromkeys(named, keep.landmark_sd))  # fmt: skip
+    clock.stage("fine")
     stages = keep.fine if tried else keep.warm
-    fit = _run(rig, first, stages, named, keep)
+    fit = _fine(rig, first, stages, marks, sds, keep)
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("judge")
@@ -188,6 +197,47 @@ def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str
     return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd)
 
 
+def _fine(
+    rig: Rig, first: Posture, stages: tuple[Stage, ...], marks: Mapping[str, Floats],
+    sds: Mapping[str, float], keep: RegisterSettings,
+) -> RigFit:  # fmt: skip
+    """All shapes; held loosely to the scan first, tightly once they turn out to follow it.
+
+    A body that the template cannot become pulls its landmarks away if it is followed closely.
+    """
+    priors = keep.priors or Priors()
+    loose = replace(priors, noise=max(priors.noise, keep.unlike))
+    if len(stages) > 1 and keep.unlike > 0:
+        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds)
+        first, stages = fit.posture, stages[-1:]
+        if fit.patch_sd > keep.follows:
+            priors = loose
+    return rig.fit(first, stages, keep.weights, priors, marks, sds)
+
+
+def found_landmarks(
+    scan: Surface, rig: Rig, posture: Posture, named: Mapping[str, Floats], keep: RegisterSettings
+) -> tuple[dict[str, Floats], dict[str, float]]:
+    """Landmarks to fit, (3,) m, and their standard deviations: those given, and nipples found.
+
+    Skin slides on skin, and a breast is round: only a nipple tells where its middle is.
+    """
+    marks, sds = dict(named), dict.fromkeys(named, keep.landmark_sd)
+    if keep.sure is None:
+        return marks, sds
+    from supple.registration.auto_landmarks import propose
+
+    chest = [bone.name for bone in rig.template.bones].index("chest")
+    R, joint = posture.rotations[chest], rig.template.joints[chest]
+    upright = R.T, joint - R.T @ (joint + posture.translations[chest])
+    at = rig.template.landmark_points(rig.vertices(posture))
+    for name, one in propose(scan, upright).items():
+        near = np.linalg.norm(one.point - at[name]) < keep.found_reach if name in at else False
+        if near and name not in marks and one.confidence >= keep.sure and "nipple" in name:
+            marks[name], sds[name] = one.point, keep.found_sd / one.confidence
+    return marks, sds
+
+
 def _coarse(rig: Rig, starts: list[Candidate], named: Mapping[str, Floats],
             keep: RegisterSettings) -> list[RigFit]:  # fmt: skip
     """Coarse fits of the starts that are nearly as good as the best, best first."""
@@ -212,7 +262,7 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
 
 def _result(rig: Rig, scan: Surface, fit: RigFit, moved: Offset, tried: list[RigFit],
             starts: list[Candidate], keep: RegisterSettings, clock: _Clock) -> Registration:  # fmt: skip
-    covariance = fit.covariance()
+    covariance = uncertainty.of_fit(fit, rig.template)
     warnings = doubts(rig, fit, tried, starts, covariance, keep.doubts)
     history = [value for one in [*tried[:1], fit] for value in one.history]
     return Registration(

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.page import as_script, packed, thinned
+from supple.registration.portrait import needs_head
 
 if TYPE_CHECKING:
     from supple.registration.report import ReportData
@@ -29,7 +30,7 @@ def scene(data: ReportData) -> dict[str, str]:
             "values": None if r.covariance is None else packed(1e3 * r.sd, "<f4"),
         },
         "curves": [
-            {"name": _plain(name), "closed": c.closed, "arrow": "arrow" in name,
+            {"name": _plain(name), "closed": c.closed, "arrow": needs_head(name, c.points),
              "points": _upright(data, c.points).round(2).tolist(), "on": c.on_scan.tolist()}
             for name, c in data.curves.items()
         ],

@@ -43,8 +43,9 @@ def _verdict(data: ReportData) -> str:
         return f'<div class="verdict bad"><b>✗ Do not rely on this result.</b>{reasons}</div>'
     count = len(data.registration.warnings)
     if count:
-        return f'<div class="verdict warn"><b>✓ Trustworthy, with {count} warning' \
-               f'{"s" if count > 1 else ""}.</b>{bullets(data.registration.warnings)}</div>'  # fmt: skip
+        words = f"✓ Trustworthy, with {count} warning{'s' if count > 1 else ''}."
+        told = bullets(data.registration.warnings)
+        return f'<div class="verdict warn"><b>{words}</b>{told}</div>'
     return '<p class="verdict good"><b>✓ The fit is trustworthy by its own checks.</b></p>'
 
 
@@ -63,7 +64,9 @@ def _sides(data: ReportData) -> str:
     of = data.measures.of
     lines = [(f"{_plain(name)} ({unit})", _with_sd(of(name, "right")), _with_sd(of(name, "left")))
              for name, (unit, _) in OF_A_BREAST.items()]  # fmt: skip
-    return rows([*lines, ("grade of ptosis", *(data.measures.ptosis[s] for s in ("right", "left")))])
+    return rows(
+        [*lines, ("grade of ptosis", *(data.measures.ptosis[s] for s in ("right", "left")))]
+    )
 
 
 def _both(data: ReportData) -> str:

@@ -61,7 +61,7 @@ def axes(covariance: Floats, unknowns: int) -> Floats:
 
 
 def posed_many(template: Template, postures: list[Posture]) -> tuple[Floats, Floats]:
-    """Vertices (s, n, 3) m of several postures, as ``posed`` has one, and rotations (s, K, 3, 3)."""
+    """Vertices (s, n, 3) m of postures, each as ``posed`` has it, and rotations (s, K, 3, 3)."""
     n = len(template.points)
     blend = np.array([p.blend for p in postures]).reshape(len(postures), -1)
     shape = template.points + (blend @ template.blendshapes.reshape(-1, 3 * n)).reshape(-1, n, 3)

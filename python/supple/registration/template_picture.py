@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError
-from supple.registration.portrait import INK, MARK, PEN, skin_colours
+from supple.registration.portrait import INK, MARK, PEN, needs_head, skin_colours
 from supple.registration.skin import vertex_normals
 from supple.registration.template import Template
 
@@ -39,9 +39,10 @@ def draw_template(path: str | Path, template: Template) -> Path:
         raise InputError(f"a picture needs a name in .png or .svg, got {file.name}.")
     figure = Figure(figsize=(12, 9.5), dpi=90, layout="constrained")
     FigureCanvasAgg(figure)
-    top, below = figure.subfigures(2, 1, height_ratios=(1.35, 1))
+    parts: Any = figure.subfigures(2, 1, height_ratios=(1.35, 1))
+    top, below = parts
     figure.suptitle(f"{template.name}: {len(template.points)} vertices, {len(template.bones)} "
-                    f"bones, {len(template.blendshape_names)} blendshapes", fontsize=11)  # fmt: skip
+                    f"bones, {len(template.blendshapes)} blendshapes", fontsize=11)  # fmt: skip
     drawn, side, bones = top.subplots(1, 3)
     _drawn(drawn, template, _FRONT, "from the front")
     _drawn(side, template, _LEFT, "from her left")
@@ -80,7 +81,9 @@ def _body(
 ) -> Floats:  # fmt: skip
     """The skin from one side, mm; returns it seen so (n, 3)."""
     seen = 1e3 * points @ view.T
-    shade = np.clip(vertex_normals(points, template.triangles) @ (view.T @ [-0.35, 0.75, 0.55]), 0, 1)
+    shade = np.clip(
+        vertex_normals(points, template.triangles) @ (view.T @ [-0.35, 0.75, 0.55]), 0, 1
+    )
     a, b, c = (seen[template.triangles[:, k]][:, [0, 2]] for k in range(3))
     ahead = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] > 0
     faces = template.triangles[ahead]
@@ -91,9 +94,9 @@ def _body(
     else:
         from matplotlib.collections import PolyCollection
 
-        light = (0.45 + 0.55 * shade[faces].mean(axis=1))[:, None]
-        flat = np.clip(colours[faces].mean(axis=1) * light, 0, 1)
-        axes.add_collection(PolyCollection(seen[faces][:, :, [0, 2]], facecolors=flat,
+        lit = (0.45 + 0.55 * shade[faces].mean(axis=1))[:, None]
+        flat = np.clip(colours[faces].mean(axis=1) * lit, 0, 1)
+        axes.add_collection(PolyCollection(list(seen[faces][:, :, [0, 2]]), facecolors=flat,
                                            edgecolors=flat, linewidths=0.3))  # fmt: skip
         axes.autoscale_view()
     axes.set_aspect("equal")
@@ -113,7 +116,7 @@ def _drawn(axes: Any, template: Template, view: Floats, title: str) -> None:
         if place.closed:
             flat = np.vstack([flat, flat[:1]])
         axes.plot(*flat.T, color=PEN, linewidth=1.8)
-        if "arrow" in name and np.isfinite(flat[-2:]).all():
+        if needs_head(name, at) and np.isfinite(flat[-2:]).all():
             axes.annotate("", flat[-1], flat[-2],
                           arrowprops={"arrowstyle": "-|>", "color": PEN})  # fmt: skip
     for place in template.landmarks.values():
