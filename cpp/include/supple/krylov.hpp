@@ -52,9 +52,9 @@ struct CgReport {
   double spread = 0.0; ///< smallest over largest Ritz value of M⁻¹A, 0 where too few are known
 };
 
-/// Iterations after which a probe should know that A is definite, if the smallest eigenvalue of M⁻¹A
-/// is `spread` times the largest: by the bound on the fall of its residual (Saad, eq. 6.128), or by
-/// its Ritz values.
+/// Iterations after which a probe should know that A is definite, if the smallest eigenvalue of
+/// M⁻¹A is `spread` times the largest: by the bound on the fall of its residual (Saad, eq. 6.128),
+/// or by its Ritz values.
 int probe_iterations(double spread, double size);
 
 /// Solve A x = b by conjugate gradients preconditioned with M; x is the last iterate also where it
