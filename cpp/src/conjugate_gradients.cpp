@@ -51,9 +51,17 @@ class RitzValues {
   double last_ = 1.0;
 };
 
-/// Entries ±1 in an order without order (splitmix64), the same each time.
-Vector noise(Eigen::Index size) {
-  Vector result(size);
+/// Iterations from noise after which Ritz values of this spread leave no eigenvalue below 0 but by
+/// the chance kMissed.
+double believed_after(double spread, double size) {
+  const double digits = std::log(2.0 * 1.648 * std::sqrt(size) / kMissed);
+  return std::min(std::max(0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0), 1.0 * kFewest), 1e9);
+}
+
+} // namespace
+
+Vector probe_noise(Eigen::Index size) {
+  Vector result(size); // splitmix64
   std::uint64_t state = 0;
   for (double& entry : result) {
     std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
@@ -63,15 +71,6 @@ Vector noise(Eigen::Index size) {
   }
   return result;
 }
-
-/// Iterations from noise after which Ritz values of this spread leave no eigenvalue below 0 but by
-/// the chance kMissed.
-double believed_after(double spread, double size) {
-  const double digits = std::log(2.0 * 1.648 * std::sqrt(size) / kMissed);
-  return std::min(std::max(0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0), 1.0 * kFewest), 1e9);
-}
-
-} // namespace
 
 int probe_iterations(double spread, double size) {
   if (!(spread > 0.0)) return std::numeric_limits<int>::max();
@@ -91,9 +90,13 @@ CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditio
   Vector r = b, z(n), q(n);
   const double loudness = (scale > 0.0 ? scale : 1.0) / std::sqrt(static_cast<double>(n));
   if (settings.probe) {
-    preconditioner(loudness * noise(n), z);
-    x += z;
-    ++report.iterations;
+    if (settings.echo != nullptr) {
+      x += loudness * *settings.echo;
+    } else {
+      preconditioner(loudness * probe_noise(n), z);
+      x += z;
+      ++report.iterations;
+    }
   }
   if (!x.isZero(0.0)) {
     matrix(x, q);

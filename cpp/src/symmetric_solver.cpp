@@ -112,6 +112,7 @@ FactorStatus SymmetricSolver::renew() {
   k.turned = turn_;
   k.at = at_;
   k.spread = 1.0;
+  k.echo.resize(0);
   if (status.ok() && k.made->proves()) definite_ = Definite::Yes;
   if (status.cause == FactorStatus::Cause::NotPositiveDefinite) definite_ = Definite::No;
   return status;
@@ -132,9 +133,10 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   };
   const int saved = k.made->break_even();
   const bool unsure = probe && definite_ == Definite::Unknown;
+  const Vector echo = unsure ? this->echo() : Vector();
   const int limit = k.made->exact() ? std::max(kFewest, 2 * saved) : kMost;
   const CgReport report =
-      conjugate_gradients(matrix, preconditioner, rhs, x, {tolerance, limit, unsure});
+      conjugate_gradients(matrix, preconditioner, rhs, x, {tolerance, limit, unsure, &echo});
   work.iterations += report.iterations;
   if (report.spread != 0.0) k.spread = report.spread;
   if (fresh_) rate(report);
@@ -142,6 +144,19 @@ CgReport SymmetricSolver::iterate(const Vector& rhs, double tolerance, bool prob
   if (report.definite != Definite::Unknown && definite_ == Definite::Unknown)
     definite_ = report.definite;
   return report;
+}
+
+/// What M⁻¹ makes of a probe's noise that turns with the nodes, which is as good as any other.
+Vector SymmetricSolver::echo() {
+  Kept& k = now();
+  if (k.echo.size() == 0 || !k.made->exact()) {
+    k.echo.resize(pattern_.size);
+    k.made->apply(probe_noise(pattern_.size), k.echo);
+    ++work.iterations;
+  }
+  Vector result = k.echo;
+  if (!fresh_) rotations_.turn(since_, result);
+  return result;
 }
 
 /// Iterations more than a fresh preconditioner would have needed.

@@ -41,7 +41,8 @@ enum class Definite { Yes, No, Unknown };
 struct CgSettings {
   double tolerance = 1e-10; ///< ‖b − Ax‖₂ ≤ tolerance·‖b‖₂
   int max_iterations = 50;
-  bool probe = false; ///< go on until it is known whether A is positive definite
+  bool probe = false;           ///< go on until it is known whether A is positive definite
+  const Vector* echo = nullptr; ///< M⁻¹ probe_noise(n), where it is at hand: one M⁻¹ less to do
 };
 
 struct CgReport {
@@ -51,6 +52,9 @@ struct CgReport {
   Definite definite = Definite::Unknown;
   double spread = 0.0; ///< smallest over largest Ritz value of M⁻¹A, 0 where too few are known
 };
+
+/// Entries ±1 in an order without order, the same each time: ν of a probe, but for its size.
+Vector probe_noise(Eigen::Index size);
 
 /// Iterations after which a probe should know that A is definite, if the smallest eigenvalue of
 /// M⁻¹A is `spread` times the largest: by the bound on the fall of its residual (Saad, eq. 6.128),

@@ -66,6 +66,7 @@ class SymmetricSolver {
     std::unique_ptr<Preconditioner> made;
     std::vector<Eigen::Matrix3d> turned; // rotations where it was made
     Vector at;                           // u there
+    Vector echo;                         // of a probe's noise, once there was one
     bool usable = false;                 // it was made, and that was ok
     bool worn = false;                   // a new one would have cost less
     bool anew = true;                    // it was made from nothing
@@ -78,6 +79,7 @@ class SymmetricSolver {
   Kept& now() { return kept_[now_]; }
   const Kept& now() const { return kept_[now_]; }
   void choose();
+  Vector echo();
   void make_room();
   void take(const Vector& values, const ConstVector& u);
   int excess(const CgReport& report) const;
