@@ -12,9 +12,14 @@ namespace supple {
 namespace {
 
 constexpr double kMissed = 1e-4;   // chance that an eigenvalue below 0 goes unseen
+constexpr double kFaint = 0.01;    // of the largest: how far below 0 it must be for that
+constexpr double kCentre = 0.8;    // above 2/√(2π), the density of a normal number's size at 0
 constexpr double kBeyond = 1.1;    // the largest eigenvalue, of the largest Ritz value
 constexpr double kNoCurve = 1e-14; // of |p||Ap|: rounding
-constexpr int kFewest = 4;         // iterations before Ritz values are looked at
+constexpr int kFewest = 4;         // iterations before Ritz values alone are believed
+
+/// Of the largest Ritz value and of the noise in one direction: what a residual is to fall below.
+constexpr double kSilence = kMissed / kCentre * kFaint;
 
 /// Lanczos' tridiagonal matrix of M⁻¹A, from the coefficients of conjugate gradients.
 class RitzValues {
@@ -26,31 +31,37 @@ class RitzValues {
     last_ = alpha;
   }
 
-  /// Look at the values so far: what they say of a matrix of size `n`.
-  void judge(Eigen::Index n, CgReport& report) const {
+  /// Look at the values so far; the largest of them.
+  double judge(CgReport& report) const {
     const auto k = static_cast<Eigen::Index>(diagonal_.size());
-    if (k == 0) return;
+    if (k == 0) return 0.0;
     Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
     solver.computeFromTridiagonal(Eigen::Map<const Vector>(diagonal_.data(), k),
                                   Eigen::Map<const Vector>(beside_.data(), k - 1),
                                   Eigen::EigenvaluesOnly);
-    report.spread = solver.eigenvalues()[0] / solver.eigenvalues()[k - 1];
-    const int enough = probe_iterations(report.spread, static_cast<double>(n));
-    if (!(report.spread > 0.0)) {
-      report.definite = Definite::No;
-    } else if (k >= kFewest && k >= enough) {
-      report.definite = Definite::Yes;
-    }
+    const double largest = solver.eigenvalues()[k - 1];
+    report.spread = solver.eigenvalues()[0] / largest;
+    if (!(report.spread > 0.0)) report.definite = Definite::No;
+    return largest;
   }
+  int count() const { return static_cast<int>(diagonal_.size()); }
 
  private:
   std::vector<double> diagonal_, beside_;
   double last_ = 1.0;
 };
 
-/// Entries ±1 in an order without order (splitmix64), the same each time.
-Vector noise(Eigen::Index size) {
-  Vector result(size);
+/// Iterations from noise after which Ritz values of this spread leave no eigenvalue below 0 but by
+/// the chance kMissed.
+double believed_after(double spread, double size) {
+  const double digits = std::log(2.0 * 1.648 * std::sqrt(size) / kMissed);
+  return std::min(std::max(0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0), 1.0 * kFewest), 1e9);
+}
+
+} // namespace
+
+Vector probe_noise(Eigen::Index size) {
+  Vector result(size); // splitmix64
   std::uint64_t state = 0;
   for (double& entry : result) {
     std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
@@ -61,15 +72,12 @@ Vector noise(Eigen::Index size) {
   return result;
 }
 
-} // namespace
-
 int probe_iterations(double spread, double size) {
   if (!(spread > 0.0)) return std::numeric_limits<int>::max();
-  const double digits = std::log(2.0 * 1.648 * std::sqrt(size) / kMissed);
-  const double whole = 0.5 * (digits / std::sqrt(spread / kBeyond) + 1.0);
-  const double away = std::max((1.0 - spread) / (1.0 + spread), kNoCurve); // from their middle
-  const double close = 1.0 + digits / -std::log(away);
-  return static_cast<int>(std::min({whole + 1.0, close + 1.0, 1e9}));
+  const double root = std::sqrt(spread), rate = (1.0 - root) / (1.0 + root);
+  const double fall = std::log(2.0 * std::sqrt(size) / kSilence);
+  const double silent = 2.0 + fall / -std::log(std::max(rate, kNoCurve));
+  return static_cast<int>(std::min(silent, 1.0 + believed_after(spread, size)));
 }
 
 CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditioner,
@@ -80,11 +88,15 @@ CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditio
   const double scale = b.norm();
   if (n == 0) return {true, 0, 0.0, Definite::Yes, 1.0};
   Vector r = b, z(n), q(n);
+  const double loudness = (scale > 0.0 ? scale : 1.0) / std::sqrt(static_cast<double>(n));
   if (settings.probe) {
-    const double size = (scale > 0.0 ? scale : 1.0) / std::sqrt(static_cast<double>(n));
-    preconditioner(size * noise(n), z);
-    x += z;
-    ++report.iterations;
+    if (settings.echo != nullptr) {
+      x += loudness * *settings.echo;
+    } else {
+      preconditioner(loudness * probe_noise(n), z);
+      x += z;
+      ++report.iterations;
+    }
   }
   if (!x.isZero(0.0)) {
     matrix(x, q);
@@ -114,14 +126,15 @@ CgReport conjugate_gradients(const Operator& matrix, const Operator& preconditio
     if (!std::isfinite(length)) break;
     if (curvature < 0.0) report.definite = Definite::No;
     ritz.add(alpha, beta);
-    if (settings.probe && report.definite == Definite::Unknown) ritz.judge(n, report);
+    if (settings.probe && report.definite == Definite::Unknown) {
+      const double largest = ritz.judge(report);
+      const bool silent = length <= kSilence * largest * loudness;
+      if (report.definite == Definite::Unknown &&
+          (silent || ritz.count() >= believed_after(report.spread, static_cast<double>(n))))
+        report.definite = Definite::Yes;
+    }
   }
-  if (report.definite == Definite::Unknown) { // of a start that may spare an eigenvector: no proof
-    CgReport guess;
-    ritz.judge(n, guess);
-    report.spread = guess.spread;
-    if (guess.definite == Definite::No) report.definite = Definite::No;
-  }
+  if (report.definite == Definite::Unknown) ritz.judge(report);
   report.residual = scale > 0.0 ? length / scale : 0.0;
   report.converged = length <= goal;
   return report;

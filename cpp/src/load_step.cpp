@@ -14,8 +14,8 @@ namespace {
 constexpr double kShortest = 1.0 / 1024.0; // of a Newton step
 constexpr double kArmijo = 1e-4;           // Nocedal and Wright (2006), eq. 3.4
 constexpr double kLargestShift = 1e4;
-constexpr double kSettled = 1e-2; // accuracy of the step that shows that no more are needed
-constexpr int kPatience = 4;      // times more iterations where each is sure to lower the energy
+constexpr double kSettled = 0.1; // accuracy of the step that shows that no more are needed
+constexpr int kPatience = 4;     // times more iterations where each is sure to lower the energy
 constexpr double kCreeping = 1.0 / 32.0;       // of a step, below which there are better ways on
 constexpr double kSure = 0.1;                  // of the tolerance, that a chord's step is to reach
 constexpr double kLoosest = 0.1, kAlpha = 1.5; // of the forcing, where solves are iterated
@@ -65,12 +65,13 @@ Outcome LoadStep::iterate(Vector& u, double s, Manner manner) {
     d += p_.system.solve(rhs, exact, p_.minimises && exact * norm <= tol);
     if (!d.allFinite()) return Outcome::Singular;
     if (first_.size() == 0) first_ = d;
+    ahead_.resize(0);
     if (manner == Manner::Full) bend(u, d, s);
     const double length = line_search(u, d, r, norm, s, manner, moves_supports);
     if (length == 0.0) return fault();
     u += length * d;
     const double before = norm;
-    r = p_.residual(u, s);
+    r = length == 1.0 && ahead_.size() > 0 ? ahead_ : p_.residual(u, s);
     norm = p_.free_norm(r);
     p_.result.last_residual = r;
     tol = p_.tolerance(u, r, s);
@@ -97,8 +98,11 @@ void LoadStep::bend(const Vector& u, Vector& d, double s) {
   if (!p_.has_energy || d.cwiseAbs().maxCoeff() < kStraight * p_.settings.size) return;
   const Vector arcs = p_.system.along_arcs(u, d);
   if (!((arcs - d).cwiseAbs().maxCoeff() > kBent * d.cwiseAbs().maxCoeff())) return;
-  const double straight = p_.free_norm(p_.residual(u + d, s));
-  if (!(p_.free_norm(p_.residual(u + arcs, s)) >= straight)) d = arcs;
+  ahead_ = p_.residual(u + d, s);
+  Vector bent = p_.residual(u + arcs, s);
+  if (p_.free_norm(bent) >= p_.free_norm(ahead_)) return;
+  d = arcs;
+  ahead_ = std::move(bent);
 }
 
 /// Factorise K at `u`; an indefinite K is shifted in the guarded manner until it is not.

@@ -29,6 +29,7 @@ class LoadStep {
 
   Problem& p_;
   Vector first_;
+  Vector ahead_; // residual where the step at hand ends, if it was looked at
   double shift_ = 0.0;
 };
 

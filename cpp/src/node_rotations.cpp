@@ -60,28 +60,6 @@ NodeRotations::NodeRotations(const NodeGraph& graph, const Reduction& reduction,
   }
 }
 
-template <class PlaceA, class PlaceB>
-NodeRotations::Moments NodeRotations::moments(Index node, PlaceA place_a, PlaceB place_b) const {
-  const auto first = static_cast<std::size_t>(node);
-  Moments sum{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
-  const Eigen::Vector3d a0 = place_a(node), b0 = place_b(node);
-  Eigen::Vector3d sum_a = Eigen::Vector3d::Zero(), sum_b = sum_a;
-  Index count = 0;
-  for (Index k = graph_->node_start[first]; k < graph_->node_start[first + 1]; ++k) {
-    const Index other = graph_->neighbour[static_cast<std::size_t>(k)];
-    if (other >= graph_->nodes) break; // scalars come last
-    const Eigen::Vector3d a = place_a(other) - a0, b = place_b(other) - b0;
-    sum.mixed += b * a.transpose();
-    sum.own += a * a.transpose();
-    sum_a += a;
-    sum_b += b;
-    ++count;
-  }
-  sum.mixed -= sum_b * sum_a.transpose() / static_cast<double>(count);
-  sum.own -= sum_a * sum_a.transpose() / static_cast<double>(count);
-  return sum;
-}
-
 NodeRotations::Rotations NodeRotations::at(const ConstVector& u) const {
   const double *const rest = points_->data(), *const way = u.data();
   Rotations result(nodes_.size());
@@ -106,20 +84,35 @@ NodeRotations::Rotations NodeRotations::at(const ConstVector& u) const {
   return result;
 }
 
+/// Velocity's gradient at a node that moves by d: least squares over its neighbours.
+Eigen::Matrix3d NodeRotations::gradient(Index node, const Vector& place, const double* way) const {
+  const auto first = static_cast<std::size_t>(node);
+  const double *const x0 = place.data() + 3 * node, *const d0 = way + 3 * node;
+  Mixed mixed, own;
+  Index count = 0;
+  for (Index e = graph_->node_start[first]; e < graph_->node_start[first + 1]; ++e, ++count) {
+    const Index other = graph_->neighbour[static_cast<std::size_t>(e)];
+    if (other >= graph_->nodes) break; // scalars come last
+    const double *const x1 = place.data() + 3 * other, *const d1 = way + 3 * other;
+    const double a[3] = {x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]};
+    const double b[3] = {d1[0] - d0[0], d1[1] - d0[1], d1[2] - d0[2]};
+    mixed.add(a, b);
+    own.add(a, a);
+  }
+  return mixed.about_means(count) * own.about_means(count).inverse();
+}
+
 Vector NodeRotations::along_arcs(const ConstVector& u, const ConstVector& d) const {
-  const auto place = [&](Index a) -> Eigen::Vector3d {
-    return points_->segment<3>(3 * a) + u.segment<3>(3 * a);
-  };
-  const auto way = [&](Index a) -> Eigen::Vector3d { return d.segment<3>(3 * a); };
+  const Vector place = *points_ + u.head(points_->size());
   Vector result = d;
   for (const Node& n : nodes_) {
-    const Moments sum = moments(n.node, place, way);
-    const Eigen::Matrix3d gradient = sum.mixed * sum.own.inverse();
-    const Eigen::Vector3d curl(gradient(2, 1) - gradient(1, 2), gradient(0, 2) - gradient(2, 0),
-                               gradient(1, 0) - gradient(0, 1));
+    const Eigen::Matrix3d slope = gradient(n.node, place, d.data());
+    const Eigen::Vector3d curl(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0),
+                               slope(1, 0) - slope(0, 1));
     const double angle = 0.5 * curl.norm();
     if (!(angle > kStraight) || !std::isfinite(angle)) continue;
-    const Eigen::Vector3d axis = curl.normalized(), v = way(n.node), across = axis.cross(v);
+    const Eigen::Vector3d axis = curl.normalized(), v = d.segment<3>(3 * n.node);
+    const Eigen::Vector3d across = axis.cross(v);
     result.segment<3>(3 * n.node) += (1.0 - std::cos(angle)) / angle * across +
                                      (1.0 - std::sin(angle) / angle) * axis.cross(across);
   }

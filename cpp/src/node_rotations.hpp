@@ -35,11 +35,7 @@ class NodeRotations {
   struct Node {
     Index node, unknown; ///< its first of three
   };
-  struct Moments {
-    Eigen::Matrix3d mixed, own; ///< Σ b aᵀ and Σ a aᵀ of the neighbours' places about their means
-  };
-  template <class PlaceA, class PlaceB>
-  Moments moments(Index node, PlaceA a, PlaceB b) const;
+  Eigen::Matrix3d gradient(Index node, const Vector& place, const double* way) const;
 
   const NodeGraph* graph_;
   const Vector* points_;

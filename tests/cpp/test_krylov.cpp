@@ -1,6 +1,8 @@
 #include "supple/krylov.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "check.hpp"
 #include "fixtures.hpp"
@@ -163,4 +165,33 @@ TEST(probe_finds_the_negative_eigenvalue_that_the_right_hand_side_spares) {
     CHECK(probe.definite == (entry < 0.0 ? Definite::No : Definite::Yes));
     CHECK_BELOW((diagonal.cwiseProduct(x) - rhs).norm(), 1e-9 * rhs.norm());
   }
+}
+
+/// Reflected diagonal matrices, whose eigenvectors have a part in every unknown: one eigenvalue is
+/// made −0.02 in turn, 0.01 of the largest below 0, and b has nothing of its eigenvector.
+TEST(probe_calls_no_matrix_definite_that_has_an_eigenvalue_below_zero) {
+  const Eigen::Index n = 300;
+  const Vector normal = Vector::LinSpaced(n, -1.0, 2.0).normalized();
+  const auto reflect = [&](const Vector& x) { return Vector(x - 2.0 * normal.dot(x) * normal); };
+  Vector diagonal = Vector::LinSpaced(n, 1.6, 2.0);
+  int longest = 0;
+  for (Eigen::Index i = 0; i < n; i += 3) {
+    for (const double entry : {-0.02, 1.7}) {
+      const double kept = std::exchange(diagonal[i], entry);
+      Vector part = Vector::Ones(n);
+      part[i] = 0.0;
+      const Vector rhs = reflect(part), echo = probe_noise(n);
+      const Operator matrix = [&](const Vector& x, Vector& y) {
+        y = reflect(diagonal.cwiseProduct(reflect(x)));
+      };
+      Vector x = Vector::Zero(n);
+      const CgReport probe =
+          conjugate_gradients(matrix, identity, rhs, x, {1e-6, 100, true, &echo});
+      CHECK(probe.converged && probe.definite == (entry < 0.0 ? Definite::No : Definite::Yes));
+      CHECK_BELOW((reflect(diagonal.cwiseProduct(reflect(x))) - rhs).norm(), 2e-6 * rhs.norm());
+      if (entry > 0.0) longest = std::max(longest, probe.iterations);
+      diagonal[i] = kept;
+    }
+  }
+  CHECK(longest <= probe_iterations(1.6 / 2.0, static_cast<double>(n)));
 }

@@ -59,6 +59,24 @@ def test_twenty_changes_of_parameters_need_few_factors():
     assert 4 * factorisations <= iterations
 
 
+def test_path_finds_the_factors_of_both_its_ends():
+    """After a path that went far, neither its end nor its beginning wants another factor.
+
+    The far end's alone would not serve at the beginning: there a new body's own beginning, where
+    one factor and no iteration but its rounding's is needed, sets what is few.
+    """
+    body, light, end = beam(), (0.0, 0.0, -2e-3), (0.0, 0.0, -2.0)
+    far = body.solve(solver="cg")
+    assert abs(far.u).max() > 0.1 * LENGTH
+    near = body.gravity(light).solve(solver="cg")
+    again = body.gravity(end).solve(solver="cg")
+    assert near.timings["factorisations"] == again.timings["factorisations"] == 0
+    fresh = beam().gravity(light).solve(solver="cg")
+    assert near.timings["krylov_iterations"] <= fresh.timings["krylov_iterations"]
+    assert_same(near, fresh)
+    assert_same(again, beam().solve(solver="direct"))
+
+
 def test_other_loads_and_supports_are_met_with_what_is_kept():
     """Gravity the other way and a moved support, after a factor was kept for neither."""
     body = beam()

@@ -41,7 +41,8 @@ enum class Definite { Yes, No, Unknown };
 struct CgSettings {
   double tolerance = 1e-10; ///< ‖b − Ax‖₂ ≤ tolerance·‖b‖₂
   int max_iterations = 50;
-  bool probe = false; ///< go on until it is known whether A is positive definite
+  bool probe = false;           ///< go on until it is known whether A is positive definite
+  const Vector* echo = nullptr; ///< M⁻¹ probe_noise(n), where it is at hand: one M⁻¹ less to do
 };
 
 struct CgReport {
@@ -52,12 +53,12 @@ struct CgReport {
   double spread = 0.0; ///< smallest over largest Ritz value of M⁻¹A, 0 where too few are known
 };
 
-/// Iterations of a probe after which A is known to be definite, if these are its extreme values.
-///
-/// The fewer of two bounds, each for a chance of 5e-5 (Kuczyński, Woźniakowski): that a value below
-/// 0 goes unseen beside the largest of M⁻¹A (theorem 4.2); and that M⁻¹A − cI, c in the middle of
-/// the values seen, has one of size c unseen where none seen is larger than (1−s)/(1+s)·c, s their
-/// spread (theorem 4.1, of the power method with (M⁻¹A − cI)², which Lanczos' is no worse than).
+/// Entries ±1 in an order without order, the same each time: ν of a probe, but for its size.
+Vector probe_noise(Eigen::Index size);
+
+/// Iterations after which a probe should know that A is definite, if the smallest eigenvalue of
+/// M⁻¹A is `spread` times the largest: by the bound on the fall of its residual (Saad, eq. 6.128),
+/// or by its Ritz values.
 int probe_iterations(double spread, double size);
 
 /// Solve A x = b by conjugate gradients preconditioned with M; x is the last iterate also where it
@@ -65,8 +66,15 @@ int probe_iterations(double spread, double size);
 ///
 /// Negative curvature, or a Ritz value of M⁻¹A that is not positive, proves A not to be positive
 /// definite; the iteration goes on, as a Galerkin method, as long as it is defined. `probe` starts
-/// it from noise, of a fixed seed, that spares no eigenvector: A is then called definite when the
-/// chance that an eigenvalue below 0 was missed is at most 1e-4, and otherwise stays unknown.
+/// it from M⁻¹ν, ν noise of a fixed seed that spares no eigenvector, and goes on until it knows:
+///
+///     A w = λ M w, λ ≤ 0, all Ritz values θ > 0:   |wᵀr| = |wᵀr₀| Π (1 − λ/θ) ≥ |wᵀr₀|
+///     wᵀr₀ = wᵀb − λ wᵀν,  wᵀν of size ‖w‖₂|ν|:    P(|wᵀr₀| ≤ δ|λ||ν|‖w‖₂) ≤ 0.8 δ
+///
+/// so that ‖r‖₂ ≤ δ|λ||ν| leaves no λ below −0.01 of the largest θ but by a chance of 1e-4, and
+/// one nearer to 0 by one in proportion. Where M is far from A, and r falls slowly, positive Ritz
+/// values are believed after as many iterations as leave the same chance from a random start. A is
+/// then called definite, and otherwise stays unknown.
 /// Cost: one A and one M⁻¹ an iteration, 10 n operations; a probe one more of each.
 /// Sources: Saad (2003), Iterative Methods for Sparse Linear Systems, algorithm 9.1 and §6.7.3;
 /// Kuczyński, Woźniakowski (1992), SIAM J. Matrix Anal. Appl. 13(4), theorem 4.2.

@@ -5,7 +5,9 @@
 ///     gradients
 ///
 /// A new factor where the iterations cost more than it; a matrix that is not positive definite is
-/// found by negative curvature, or by the factor that then fails.
+/// found by negative curvature, or by the factor that then fails. Of small factors two are kept,
+/// made far from each other, and the one made nearer to u serves: the next path that begins and
+/// ends where this one did finds both ends.
 /// Source of the rotations: Müller, Gross (2004), Interactive virtual materials, §2 (there of
 /// cells).
 #pragma once
@@ -59,7 +61,26 @@ class SymmetricSolver {
   SymmetricWork work;
 
  private:
+  /// A preconditioner, and how it has served.
+  struct Kept {
+    std::unique_ptr<Preconditioner> made;
+    std::vector<Eigen::Matrix3d> turned; // rotations where it was made
+    Vector at;                           // u there
+    Vector echo;                         // of a probe's noise, once there was one
+    bool usable = false;                 // it was made, and that was ok
+    bool worn = false;                   // a new one would have cost less
+    bool anew = true;                    // it was made from nothing
+    double rate = 0.0;                   // digits an iteration, when it was fresh
+    double best_rate = 0.0;              // and when it had been made from nothing
+    double spread = 0.0;                 // of the last matrix solved with, seen through it
+  };
+
   FactorStatus renew();
+  Kept& now() { return kept_[now_]; }
+  const Kept& now() const { return kept_[now_]; }
+  void choose();
+  Vector echo();
+  void make_room();
   void take(const Vector& values, const ConstVector& u);
   int excess(const CgReport& report) const;
   void rate(const CgReport& report);
@@ -71,15 +92,11 @@ class SymmetricSolver {
   const NodeRotations& rotations_;
   std::unique_ptr<SymmetricProduct> product_;
   MakePreconditioner make_;
-  std::unique_ptr<Preconditioner> kept_;
-  std::vector<Eigen::Matrix3d> turned_, turn_, since_; // rotations where it was made, now, between
-  bool usable_ = false;                                // it was made, and that was ok
-  bool fresh_ = false;                                 // of the matrix at hand
-  bool worn_ = false;                                  // a new one would have cost less
-  bool anew_ = true;                                   // it was made from nothing
-  double rate_ = 0.0;                                  // digits an iteration, when it was fresh
-  double best_rate_ = 0.0;                             // and when it had been made from nothing
-  double spread_ = 0.0; // of the last matrix solved with, seen through what is kept
+  std::vector<Kept> kept_{1};
+  std::size_t now_ = 0;                       // the one that serves
+  std::vector<Eigen::Matrix3d> turn_, since_; // rotations at hand, and from where that was made
+  Vector at_;                                 // u of the matrix at hand
+  bool fresh_ = false;                        // what serves was made of the matrix at hand
   Definite definite_ = Definite::Unknown;
   const Vector* values_ = nullptr;
 };
