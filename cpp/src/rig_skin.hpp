@@ -17,6 +17,7 @@ Eigen::Matrix<T, 3, 3> skew(const Eigen::Matrix<T, 3, 1>& w) {
   return cross;
 }
 
+/// exp(ω): the rotation by |ω| rad about ω; for complex steps too.
 template <class T>
 Eigen::Matrix<T, 3, 3> rotation_of(const Eigen::Matrix<T, 3, 1>& w) {
   using std::cos, std::sin, std::sqrt, std::abs;

@@ -138,3 +138,5 @@ def test_wrong_input_is_refused() -> None:
         rig.fit(Posture.rest(template), landmarks={"elbow": (0, 0, 0)})
     with pytest.raises(InputError, match="must be ≥ 0"):
         Weights(scale=-1)
+    with pytest.raises(InputError, match="an iteration at least"):
+        rig.fit(Posture.rest(template), (Stage(iterations=0),))

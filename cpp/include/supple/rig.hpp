@@ -7,7 +7,6 @@
 /// then the blend: 9 K + A. Source: Mazier (2022), eqs. 23–25.
 #pragma once
 
-#include <array>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <vector>
@@ -114,10 +113,6 @@ class Rig {
   std::vector<int> weight_start_, offset_start_;
   std::vector<char> border_;
 };
-
-/// exp(ω): the rotation by |ω| rad about ω; for complex steps too.
-template <class T>
-Eigen::Matrix<T, 3, 3> rotation_of(const Eigen::Matrix<T, 3, 1>& w);
 
 /// After a step (9K + A): exp(ω) R, shift, scale, blend.
 RigPosture stepped(const RigPosture& posture, const Eigen::VectorXd& step);
