@@ -48,7 +48,7 @@ def test_the_sternums_region_is_what_align_takes() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["a,b\n1,2\n", "x,y,z\n1,2,three\n", "x,y,z\nnan,1,1\n", "x,y,z\n9e3,0,0\n"]
+    "rows", ["a,b\n1,2\n", "x,y,z\n1,2,three\n", "x,y,z\nnan,1,1\n", "x,y,z\n9e3,0,0\n"]
 )
 def test_a_brush_that_paints_nothing_is_refused(tmp_path: Path, rows: str) -> None:
     """Wrong columns, no numbers, or a place with no skin."""
