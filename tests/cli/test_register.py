@@ -62,9 +62,11 @@ def truth(scan: SyntheticScan) -> Callable[..., Callable[..., Registration]]:
             n = len(template.points)
             points = posed(template, scan.truth.posture)
             warnings = [] if trustworthy else ["Only a <third> of the scan is explained."]
-            return Registration(template, scan.truth.posture, points, surface, np.zeros((n, 3)),
-                                1e-6 * np.eye(unknowns), np.zeros(n), trustworthy, warnings,
-                                {"total": 0.1}, 7, [], 0.02)  # fmt: skip
+            return Registration(
+                template, scan.truth.posture, points, surface, offset=np.zeros((n, 3)),
+                offset_precision=None, covariance=1e-6 * np.eye(unknowns), trustworthy=trustworthy,
+                warnings=warnings, seconds={"total": 0.1}, iterations=7, history=[], reach=0.02,
+            )  # fmt: skip
 
         return work
 
