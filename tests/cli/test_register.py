@@ -202,6 +202,26 @@ def test_bad_input_is_refused_before_the_fit_and_leaves_nothing(
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_study_hands_its_files_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What the study writes appears in --out; the study itself has tests of its own."""
+    from supple.studies import torso as studied
+
+    def run_study(folder: Path, samples: int, data: Path | None, progress: Any) -> list[Path]:
+        assert (samples, data) == (2, tmp_path)
+        progress("landmarks", 0.5)
+        (folder / "torso_landmarks.csv").write_text("sweep\n")
+        return [folder / "torso_landmarks.csv"]
+
+    monkeypatch.setattr(studied, "run", run_study)
+    out = tmp_path / "out"
+    given = ["--study", "--samples", "2", "--data", str(tmp_path), "--out", str(out), "--json"]
+    assert main(["register", *given]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == ["torso_landmarks.csv"]
+    assert {path.name for path in out.iterdir()} == {"torso_landmarks.csv", "result.json"}
+
+
 def test_parameters_of_another_template_are_refused(tmp_path: Path) -> None:
     from supple import InputError
 

@@ -226,9 +226,13 @@ def test_the_axes_of_a_covariance_sum_to_it():
     assert np.allclose(steps.T @ steps, root @ root.T, rtol=1e-9)
 
 
-def test_many_postures_are_posed_as_one_is(torso):
+@pytest.mark.parametrize("shapes", [2, 0])
+def test_many_postures_are_posed_as_one_is(torso, shapes):
+    torso = replace(torso, blendshapes=torso.blendshapes[:shapes],
+                    blendshape_names=torso.blendshape_names[:shapes],
+                    blendshape_bounds=torso.blendshape_bounds[:shapes])  # fmt: skip
     rng = np.random.default_rng(0)
-    steps = 0.1 * rng.normal(size=(3, 9 * len(torso.bones) + 2))
+    steps = 0.1 * rng.normal(size=(3, 9 * len(torso.bones) + shapes))
     postures = [Posture.rest(torso).stepped(step) for step in steps]
     many, rotations = posed_many(torso, postures)
     for at, turned, posture in zip(many, rotations, postures, strict=True):

@@ -100,8 +100,9 @@ def axes(covariance: Floats, unknowns: int) -> Floats:
 def posed_many(template: Template, postures: list[Posture]) -> tuple[Floats, Floats]:
     """Vertices (s, n, 3) m of postures, each as ``posed`` has it, and rotations (s, K, 3, 3)."""
     n = len(template.points)
-    blend = np.array([p.blend for p in postures]).reshape(len(postures), -1)
-    shape = template.points + (blend @ template.blendshapes.reshape(-1, 3 * n)).reshape(-1, n, 3)
+    blend = np.array([p.blend for p in postures])
+    flat = template.blendshapes.reshape(len(template.blendshapes), 3 * n)
+    shape = template.points + (blend @ flat).reshape(-1, n, 3)
     rotations = np.array([p.rotations for p in postures])
     affine = rotations * np.array([p.scales for p in postures])[:, :, None, :]
     offsets = template.joints + np.array([p.translations for p in postures])
