@@ -62,9 +62,11 @@ def truth(scan: SyntheticScan) -> Callable[..., Callable[..., Registration]]:
             n = len(template.points)
             points = posed(template, scan.truth.posture)
             warnings = [] if trustworthy else ["Only a <third> of the scan is explained."]
-            return Registration(template, scan.truth.posture, points, surface, np.zeros((n, 3)),
-                                1e-6 * np.eye(unknowns), np.zeros(n), trustworthy, warnings,
-                                {"total": 0.1}, 7, [], 0.02)  # fmt: skip
+            return Registration(
+                template, scan.truth.posture, points, surface, offset=np.zeros((n, 3)),
+                offset_precision=None, covariance=1e-6 * np.eye(unknowns), trustworthy=trustworthy,
+                warnings=warnings, seconds={"total": 0.1}, iterations=7, history=[], reach=0.02,
+            )  # fmt: skip
 
         return work
 
@@ -198,6 +200,26 @@ def test_bad_input_is_refused_before_the_fit_and_leaves_nothing(
     assert main(["register", *(a.format(**names) for a in arguments)]) == 2
     assert re.search(match, capsys.readouterr().err)
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_study_hands_its_files_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What the study writes appears in --out; the study itself has tests of its own."""
+    from supple.studies import torso as studied
+
+    def run_study(folder: Path, samples: int, data: Path | None, progress: Any) -> list[Path]:
+        assert (samples, data) == (2, tmp_path)
+        progress("landmarks", 0.5)
+        (folder / "torso_landmarks.csv").write_text("sweep\n")
+        return [folder / "torso_landmarks.csv"]
+
+    monkeypatch.setattr(studied, "run", run_study)
+    out = tmp_path / "out"
+    given = ["--study", "--samples", "2", "--data", str(tmp_path), "--out", str(out), "--json"]
+    assert main(["register", *given]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == ["torso_landmarks.csv"]
+    assert {path.name for path in out.iterdir()} == {"torso_landmarks.csv", "result.json"}
 
 
 def test_parameters_of_another_template_are_refused(tmp_path: Path) -> None:

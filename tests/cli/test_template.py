@@ -26,6 +26,13 @@ def test_show_draws_the_template_that_ships(
     assert "9 bones" in capsys.readouterr().out
 
 
+def test_without_a_tool_it_describes_the_template_that_ships(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["template", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["template"] == torso().name
+
+
 def test_show_draws_the_template_of_a_file(tmp_path: Path) -> None:
     write_template(torso(), tmp_path / "t.glb")
     out = tmp_path / "out"
@@ -54,6 +61,7 @@ def test_make_writes_a_template_that_is_read_again(shared: Path, tmp_path: Path)
 @pytest.mark.parametrize(
     ("arguments", "match"),
     [
+        (["--out", "x", "show"], "go after show"),
         (["show", "nowhere.glb"], "no file at nowhere.glb"),
         (["make", "nowhere"], "nowhere"),
         (["make", ".", "--name", "torso.obj"], "--name"),

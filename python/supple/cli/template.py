@@ -16,9 +16,21 @@ if TYPE_CHECKING:
 _FILE = click.Path(path_type=Path)
 
 
-@click.group()
-def template() -> None:
-    """Make a torso template from MakeHuman's data, or look at one."""
+@click.group(invoke_without_command=True)
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the results.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.pass_context
+def template(ctx: click.Context, out: Path | None, as_json: bool) -> int:
+    """Describe the torso template that ships; make one from MakeHuman's data, or look at one."""
+    if ctx.invoked_subcommand is not None:
+        if out is not None or as_json:
+            raise click.UsageError(f"--out and --json go after {ctx.invoked_subcommand}.", ctx)
+        return 0
+    from .register import chosen
+
+    with Run(out, as_json=as_json) as run:
+        _describe(run, chosen(None))
+    return run.exit_code
 
 
 @command

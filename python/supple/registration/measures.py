@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from supple.registration.breast_patch import BreastPatch, base_plane, breast_pat
 from supple.registration.geodesic import Ways, length
 from supple.registration.mirrored import Mirrored
 from supple.registration.posture import Posture, posed
+from supple.registration.spread import deviations, offset_deviations
 from supple.registration.template import OnSurface, Template
 
 if TYPE_CHECKING:
@@ -94,28 +95,35 @@ def measures(registration: Registration) -> Measures:
         MeshError: an outline of the template does not go around its nipple.
     """
     r = registration
-    return measured(r.template, r.posture, r.points, r.covariance)
+    return measured(r.template, r.posture, r.points, r.covariance, r.offset_precision)
 
 
 def measured(
-    template: Template, posture: Posture, points: Floats, covariance: Floats | None = None
-) -> Measures:
+    template: Template, posture: Posture, points: Floats, covariance: Floats | None = None,
+    offset_precision: Any = None,
+) -> Measures:  # fmt: skip
     """Measures of ``template`` with its vertices at ``points`` (n, 3) m.
 
     Args:
         posture: from which the points came; its chest says where up is.
         covariance: (9 K + A, 9 K + A) of ``Posture.stepped``; None for no standard deviations.
+        offset_precision: (n, n) sparse, 1/m², of what the points are off the posture's along their
+            normals; None where they are not.
     """
-    from supple.registration.spread import deviations
-
     chest = [bone.name for bone in template.bones].index("chest")
     ask = _questions(template, points)
-    value = ask(points[None], posture.rotations[None, chest])[0]
-    sd = [None] * len(value)
+    turn = posture.rotations[None, chest]
+    value = ask(points[None], turn)[0]
+    sd: list[float] | list[None] = [None] * len(value)
     if covariance is not None:
         beyond = points - posed(template, posture)  # what bones and blendshapes do not reach
-        sd = deviations(lambda at, rotations: ask(at + beyond, rotations[:, chest]),
-                        template, posture, covariance).tolist()  # fmt: skip
+        of_posture = deviations(lambda at, rotations: ask(at + beyond, rotations[:, chest]),
+                                template, posture, covariance)  # fmt: skip
+        of_offset = np.zeros_like(value)
+        if offset_precision is not None:
+            of_offset = offset_deviations(lambda at: ask(at, np.repeat(turn, len(at), axis=0)),
+                                          points, template.triangles, offset_precision)  # fmt: skip
+        sd = np.hypot(of_posture, of_offset).tolist()
     names = [(name, side, *of) for side in SIDES for name, of in OF_A_BREAST.items()]
     names += [(name, "", *of) for name, of in OF_BOTH.items()]
     rows = tuple(Measure(name, side, float(v), s, unit, meaning) for (name, side, unit, meaning), v,

@@ -109,7 +109,7 @@ def _scan(axes: Any, portrait: Portrait, low: Floats, high: Floats) -> None:
     scan, frame = portrait.scan, portrait.frame
     flat, depth = _flat(scan.points, frame), scan.points @ frame[1]
     colours = skin_colours()
-    inside = np.asarray((flat > low) & (flat < high)).all(axis=1)
+    inside: Any = ((flat > low) & (flat < high)).all(axis=1)
     if not len(scan.triangles):
         shown = np.flatnonzero(inside)
         shown = shown[np.argsort(depth[shown])]
