@@ -49,7 +49,7 @@ def _swell(u: float, v: float, radii: Sequence[float], height: float) -> Field:
 
 BREAST_SHAPES: dict[str, Field] = {
     "breast_size_left": _in_breast(
-        lambda q, r: (0.16 * q[:, 0] * r**0.5, 0.16 * q[:, 1] * r**0.5, 0.014 * r**0.6)),
+        lambda q, r: (0.16 * q[:, 0] * r**0.5, 0.16 * q[:, 1] * r**0.5, 0.014 * r**0.8)),
     "breast_projection_left": _in_breast(lambda q, r: (0.0, 0.0, 0.012 * smooth(r / 1.2))),
     "breast_width_left": _in_breast(lambda q, _: (0.10 * q[:, 0], 0.0, 0.0)),
     "breast_height_left": _in_breast(lambda q, _: (0.0, 0.10 * q[:, 1], 0.0)),

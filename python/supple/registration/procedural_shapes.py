@@ -18,7 +18,7 @@ BOUND = 4.0
 #: Least and greatest coefficients of those that would fold the skin, or hollow a breast, earlier.
 _TIGHTER = {
     "breast_size": (-2.0, 5.0),
-    "breast_projection": (-2.5, 5.0),
+    "breast_projection": (-2.0, 5.0),
     "breast_heavy": (-2.5, 5.0),
     "axilla_front": (-4.0, 2.5),
     "axilla_side": (-4.0, 2.0),
