@@ -47,6 +47,6 @@ def test_the_fold_of_a_step_is_its_inner_corner():
     profile = [(-0.06, 0.0), (-0.05, -0.03), (0.0, -0.05), (0.0, -0.09), (0.0, -0.2)]
     points = np.array([(x, y, z) for y, z in profile for x in (-0.01, 0.01)])
     steps = 2 * np.arange(len(profile) - 1)[:, None]
-    triangles = np.vstack([steps + (0, 1, 2), steps + (1, 3, 2)])
+    triangles = np.vstack([np.add(steps, (0, 1, 2)), np.add(steps, (1, 3, 2))])
     found = fold_below(points, triangles, np.array([0.0, -0.06, 0.0]))
     assert np.allclose(found, (0.0, 0.0, -0.05), atol=1e-12)
