@@ -14,8 +14,6 @@ from supple.registration.template import OnSurface
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
-#: From the sternal notch straight to the tip of the xiphoid, m: 0.12 of her height.
-_STERNUM = 0.19
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -157,14 +155,6 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
-
-
-def _level(line: Floats, height: float) -> Floats:
-    """Where a closed line (k, 3) m crosses a height, (m, 3) m."""
-    a, b = line, np.roll(line, -1, axis=0)
-    crossing = (a[:, 2] < height) != (b[:, 2] < height)
-    a, b = a[crossing], b[crossing]
-    return np.asarray(a + (b - a) * ((height - a[:, 2]) / (b - a)[:, 2])[:, None])
 
 
 def _notch(skin: Skin, below: float) -> Floats:
