@@ -149,3 +149,13 @@ def test_a_sweep_runs_and_more_noise_free_data_is_no_worse():
     assert all(np.isfinite(row["surface_mm"]) for row in rows)
     assert rows[1]["landmark_mm"] <= rows[0]["landmark_mm"] + 0.5
     assert replace(case, shape=1).key != case.key
+
+
+@pytest.mark.slow
+def test_a_template_without_blendshapes_registers():
+    """The first level of that sweep: bones alone reach the scan of a body within 2 cm."""
+    known = {"procedural": template()}
+    case = torso_cases.Case("procedural", "procedural", "standing", 0, 1e-3)
+    level = next(x for x in study.levels(template()) if (x.sweep, x.at) == ("blendshapes", 0))
+    found_row = study.row(case, scan(), known, level)
+    assert 0.0 < found_row["surface_mm"] < 20.0
