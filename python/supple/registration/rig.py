@@ -98,7 +98,7 @@ class Rig:
 
     def __init__(self, template: Template, dual_quaternion: bool = False) -> None:
         self.template = template
-        shapes = np.ascontiguousarray(template.blendshapes).reshape(len(template.blendshapes), -1)
+        shapes = np.ascontiguousarray(template.blendshapes).reshape(-1, 3 * len(template.points))
         self._rig = core().Rig(
             template.points, template.triangles.astype(np.int32), template.joints,
             template.parents.astype(np.int32), template.weights, shapes, dual_quaternion,
