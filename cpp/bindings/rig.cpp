@@ -184,9 +184,8 @@ void bind_rig(py::module_& module) {
       .def(
           "set_scan",
           [](RigFit& fit, const Points& points, const supple::Triangles& triangles,
-             const Points& normals, double voxel, bool thin) {
-            fit.set_scan(points, triangles, normals, {voxel, thin});
-          },
+             const Points& normals, double voxel,
+             bool thin) { fit.set_scan(points, triangles, normals, {voxel, thin}); },
           Unlocked())
       .def_property_readonly("scan", &RigFit::scan, py::return_value_policy::copy)
       .def("evaluate",
