@@ -116,6 +116,8 @@ class Setup:
     def set_skin(self, number: int = 0, **values: Any) -> Self:
         """New parameters of the skin that was added as the ``number``-th."""
         skins = self._description.skins
+        if not skins:
+            raise InputError("set_skin needs a skin, and the body has none; add one by skin().")
         if not 0 <= number < len(skins):
             raise InputError(f"number must name one of {len(skins)} skins, got {number}.")
         skin = skins[number]

@@ -156,7 +156,7 @@ def test_assemble_leaves_supports_out():
         (lambda: body().fix("base"), supple.InputError, "no tag 'base'"),
         (lambda: body().fix(lambda p: p[:, 0] > 9), supple.InputError, "no nodes chosen"),
         (lambda: body().prescribe(right, (1.0, 2.0)), supple.InputError, "u must have shape"),
-        (lambda: body().set_skin(0, young=1.0), supple.InputError, "one of 0 skins"),
+        (lambda: body().set_skin(0, young=1.0), supple.InputError, r"add one by skin\(\)"),
         (lambda: body().solve(), supple.InputError, "not held: nothing resists a .*fix or support"),
         (lambda: body().fix([0, 1]).solve(), supple.InputError, "nothing resists a turn"),
         (lambda: body().rest_shape(), supple.InputError, "not held"),

@@ -134,8 +134,9 @@ class Template:
         low, high = self.blendshape_bounds.T
         if (low > 0).any() or (high < 0).any():
             raise InputError("blendshape_bounds must hold 0, the template itself.")
-        if not np.array_equal(self.mirror[self.mirror], np.arange(len(self.points))):
-            raise InputError("mirror must lead back: mirror[mirror[i]] == i.")
+        every = np.arange(len(self.points))
+        if len(self.mirror) != len(every) or not np.array_equal(self.mirror[self.mirror], every):
+            raise InputError(f"mirror must name {len(every)} vertices, mirror[mirror[i]] == i.")
         for place, needed in (("landmarks", LANDMARKS), ("curves", CURVES), ("regions", REGIONS)):
             missing = [name for name in needed if name not in getattr(self, place)]
             if missing:
@@ -143,6 +144,8 @@ class Template:
         for name, part in {**self.landmarks, **self.curves}.items():
             if len(part) == 0 or part.triangle.max() >= len(self.triangles):
                 raise MeshError(f"{name!r} must lie on triangles 0 to {len(self.triangles) - 1}.")
+            if abs(part.barycentric.sum(axis=1) - 1).max() > 1e-9:
+                raise InputError(f"barycentric of {name!r} must sum to 1 in each row.")
         for name, region in self.regions.items():
             if region.shape != (len(self.points),) or region.dtype != bool:
                 raise InputError(f"region {name!r} must be a mask ({len(self.points)},) of bool.")
