@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from supple.registration.landmark_rules import level_with
+from supple.registration.landmark_rules import fold_below, level_with
 from supple.registration.makehuman import torso as makehuman
 from supple.registration.procedural import torso as procedural
 
@@ -15,7 +15,7 @@ from supple.registration.procedural import torso as procedural
 @pytest.mark.parametrize("name", ["procedural", "makehuman"])
 def test_a_template_s_landmarks_are_where_the_rules_put_them(name, request):
     """Xiphoid: 0.9 of the way down from notch to folds; the breast's sides: at the nipple's
-    height; its lowest point: the fold. Within 6 mm, half an edge of the skin."""
+    height; its lowest point: the crease. Within 6 mm, half an edge of the skin."""
     if name == "makehuman":
         data = request.getfixturevalue("shared") / "data" / "template_makehuman"
         template = makehuman(Path(data))
@@ -29,8 +29,8 @@ def test_a_template_s_landmarks_are_where_the_rules_put_them(name, request):
         assert np.linalg.norm(at[f"breast_medial_{side}"] - medial) < 6e-3
         assert np.linalg.norm(at[f"breast_lateral_{side}"] - lateral) < 6e-3
         assert sign * medial[0] < sign * at[f"nipple_{side}"][0] < sign * lateral[0]
-        lowest = curves[f"breast_{side}"][:, 2].min()
-        assert at[f"breast_inferior_{side}"][2] == pytest.approx(lowest, abs=6e-3)
+        under = fold_below(template.points, template.triangles, at[f"nipple_{side}"])
+        assert np.linalg.norm(at[f"breast_inferior_{side}"] - under) < 6e-3
 
 
 def test_level_points_of_a_circle_are_its_chord():
@@ -40,3 +40,13 @@ def test_level_points_of_a_circle_are_its_chord():
     inner, outer = level_with(circle, np.array([2.0, 0.0, 0.6]))
     assert np.allclose(inner, (1.2, 0, 0.6), atol=1e-4)
     assert np.allclose(outer, (2.8, 0, 0.6), atol=1e-4)
+
+
+def test_the_fold_of_a_step_is_its_inner_corner():
+    """A nipple 6 cm before a wall, the underside straight back to it 5 cm below: the corner."""
+    profile = [(-0.06, 0.0), (-0.05, -0.03), (0.0, -0.05), (0.0, -0.09), (0.0, -0.2)]
+    points = np.array([(x, y, z) for y, z in profile for x in (-0.01, 0.01)])
+    steps = 2 * np.arange(len(profile) - 1)[:, None]
+    triangles = np.vstack([np.add(steps, (0, 1, 2)), np.add(steps, (1, 3, 2))])
+    found = fold_below(points, triangles, np.array([0.0, -0.06, 0.0]))
+    assert np.allclose(found, (0.0, 0.0, -0.05), atol=1e-12)

@@ -102,6 +102,7 @@ def test_truth_moves_with_the_scan():
     assert 0 < angle <= 45
 
 
+@pytest.mark.slow
 def test_noise_has_its_standard_deviation_and_its_correlation():
     """Root mean square 2 mm; neighbours at 2 to 4 mm share half of the variance (less the decay
     exp(−d²/2ℓ²), ℓ = 12 mm), points at 60 to 80 mm none."""

@@ -1,4 +1,4 @@
-"""Postures that a search begins with: arms hanging, raised sideways, lifted; breasts of the supine."""
+"""Postures that a search begins with: arms hanging, raised sideways or lifted."""
 
 from __future__ import annotations
 

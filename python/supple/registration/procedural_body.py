@@ -27,11 +27,11 @@ _TRUNK = np.array([
     (-0.15, 0.138, -0.115, 0.078, 2.35),
     (-0.08, 0.137, -0.109, 0.084, 2.4),
     (0.00, 0.144, -0.101, 0.098, 2.45),
-    (0.07, 0.141, -0.083, 0.103, 2.45),
-    (0.12, 0.124, -0.062, 0.101, 2.4),
-    (0.16, 0.096, -0.042, 0.092, 2.2),
-    (0.20, 0.060, -0.018, 0.084, 2.0),
-    (0.26, 0.040, -0.010, 0.070, 2.0),
+    (0.07, 0.141, -0.080, 0.103, 2.45),
+    (0.12, 0.124, -0.048, 0.101, 2.4),
+    (0.16, 0.096, -0.016, 0.092, 2.2),
+    (0.20, 0.060, 0.000, 0.072, 2.0),
+    (0.26, 0.040, 0.000, 0.040, 2.0),
 ])  # fmt: skip
 
 SHOULDER = np.array([0.162, 0.024, 0.110])  #: centre of the left humeral head, m
@@ -45,7 +45,7 @@ BREAST_AXES = np.array([
     (0.0, 0.0, 1.0),
     (np.sin(_OUT), -np.cos(_OUT), 0.0),
 ])  #: rows: to the side, up, to the front of the left breast  # fmt: skip
-NIPPLE = np.array([0.008, -0.006, 0.0550])  #: in the breast's axes, m
+NIPPLE = np.array([0.008, -0.009, 0.0550])  #: in the breast's axes, m
 
 
 def level(points: Floats) -> Floats:
@@ -119,7 +119,9 @@ def shoulder_girdle(p: Floats) -> Floats:
 
 def neck(p: Floats) -> Floats:
     """A slightly flat, forward-leaning cylinder."""
-    return cone(p, tuple(NECK), tuple(NECK + 0.25 * NECK_AXIS), 0.055, 0.0515)
+    return cone(
+        p, (0.0, 0.022, 0.120), tuple(np.add((0.0, 0.022, 0.120), 0.28 * NECK_AXIS)), 0.055, 0.0515
+    )
 
 
 def arm(p: Floats) -> Floats:
@@ -135,8 +137,8 @@ def breast(p: Floats) -> tuple[Floats, Floats]:
     The lower fold is sharp; above, the breast fades into the chest.
     """
     q = (p - BREAST) @ BREAST_AXES.T
-    pole = ellipsoid(q - (0.003, -0.011, 0.0), (0.060, 0.056, 0.051))
-    slope = ellipsoid(q - (-0.002, 0.026, -0.030), (0.058, 0.080, 0.046))
+    pole = ellipsoid(q - (0.003, -0.009, 0.0), (0.060, 0.051, 0.051))
+    slope = ellipsoid(q - (-0.002, 0.027, -0.030), (0.058, 0.075, 0.046))
     mound = smooth_min(pole, slope, 0.05)
     areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
     nipple = np.linalg.norm(q - NIPPLE + (0.0, 0.0, 0.003), axis=1) - 0.0055

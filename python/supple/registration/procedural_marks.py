@@ -17,7 +17,7 @@ from supple.surface import Surface
 Floats = npt.NDArray[np.float64]
 
 #: Heights of the ends of the sternum, m: the lower is 0.9 of the way down to the breasts' folds.
-NOTCH, XIPHOID = 0.140, -0.060
+NOTCH, XIPHOID = 0.140, -0.055
 AXILLA = (0.156, 0.054)  #: x and z of the left one, m: where arm and chest part in front
 _MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
 _MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}

@@ -3,16 +3,17 @@
 1. scan       thinned, with normals
 2. start      given, from landmarks, or searched: all rotations, arms down or up
 3. coarse     rigid, bones, scales; of the rival starts the best goes on
-4. fine       all shapes, the robust threshold shrinking to the noise
-5. offset     where asked for: what bones and shapes cannot reach, smoothly
-6. judge      is the fit to be trusted, and if not, why
+4. landmarks  where asked for: nipples found on the scan join those given
+5. fine       all shapes, the robust threshold shrinking to the noise
+6. offset     what bones and shapes cannot reach, smoothly
+7. judge      is the fit to be trusted, and if not, why
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -21,57 +22,20 @@ import numpy.typing as npt
 from supple.errors import InputError
 from supple.registration import uncertainty
 from supple.registration.body_prior import body_prior
-from supple.registration.initial_pose import Candidate, SearchSettings, candidates
+from supple.registration.found_landmarks import found_landmarks
+from supple.registration.initial_pose import Candidate, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
-from supple.registration.offset import Offset, OffsetSettings, offset
+from supple.registration.offset import Offset, offset
 from supple.registration.posture import Posture
+from supple.registration.register_settings import RegisterSettings
 from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
 from supple.registration.scan_pieces import main_pieces
 from supple.registration.template import Floats, Template
-from supple.registration.trust import Doubts, doubts
-from supple.registration.weights import Weights
+from supple.registration.trust import doubts
 from supple.surface import Surface
 
-#: From a start that is a few cm off: bones first.
-COARSE = (
-    Stage("rigid", 5, 2e-3, 0.12, 0.06, 75.0, 0.3, 0.05, 4, 8),
-    Stage("bones", 8, 2e-3, 0.10, 0.04, 75.0, 0.3, 0.03, 4, 8),
-    Stage("scales", 6, 1e-3, 0.08, 0.025, 70.0, 0.3, 0.02, 3, 6),
-)  # fmt: skip
-#: All shapes, down to the noise.
-FINE = (
-    Stage("all", 8, 5e-4, 0.05, 0.015, 60.0, 0.3, 0.01, 2, 3),
-    Stage("all", 8, 1e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 1, 1),
-)
-#: The next frame of a moving scan.
-WARM = (
-    Stage("all", 2, 1e-3, 0.05, 0.02, 60.0, 0.3, 0.01, 3, 6),
-    Stage("all", 2, 2e-4, 0.03, 0.008, 60.0, 0.3, 0.0, 2, 3),
-)
-
-
-@dataclass(frozen=True)
-class RegisterSettings:
-    """How a scan is registered; lengths in m."""
-
-    weights: Weights = Weights()
-    priors: Priors | None = None  #: how bodies differ; `body_prior` of the template
-    coarse: tuple[Stage, ...] = COARSE
-    fine: tuple[Stage, ...] = FINE
-    warm: tuple[Stage, ...] = WARM
-    search: SearchSettings = SearchSettings()
-    voxel: float = 10e-3  #: the scan is thinned to one point a voxel
-    landmark_sd: float = 5e-3  #: of landmarks that are given
-    unlike: float = 8e-3  #: noise of a patch for a body unlike any that the template can become
-    follows: float = 1.5e-3  #: patches' sd after a loose fit, below which the body is like that
-    sure: float | None = None  #: landmarks found with less confidence are not used; None: none are
-    found_sd: float = 8e-3  #: of a landmark that is found for certain
-    found_reach: float = 50e-3  #: a landmark found further from the coarse fit is not used
-    starts: int = 3  #: rival starts that are tried, at most
-    rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
-    doubts: Doubts = Doubts()
-    offset: OffsetSettings | None = OffsetSettings()  #: None: bones and shapes alone
+__all__ = ["RegisterSettings", "register"]
 
 
 def register(
@@ -215,29 +179,6 @@ def _fine(
     return rig.fit(first, stages, keep.weights, priors, marks, sds)
 
 
-def found_landmarks(
-    scan: Surface, rig: Rig, posture: Posture, named: Mapping[str, Floats], keep: RegisterSettings
-) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Landmarks to fit, (3,) m, and their standard deviations: those given, and nipples found.
-
-    Skin slides on skin, and a breast is round: only a nipple tells where its middle is.
-    """
-    marks, sds = dict(named), dict.fromkeys(named, keep.landmark_sd)
-    if keep.sure is None:
-        return marks, sds
-    from supple.registration.auto_landmarks import propose
-
-    chest = [bone.name for bone in rig.template.bones].index("chest")
-    R, joint = posture.rotations[chest], rig.template.joints[chest]
-    upright = R.T, joint - R.T @ (joint + posture.translations[chest])
-    at = rig.template.landmark_points(rig.vertices(posture))
-    for name, one in propose(scan, upright).items():
-        near = np.linalg.norm(one.point - at[name]) < keep.found_reach if name in at else False
-        if near and name not in marks and one.confidence >= keep.sure and "nipple" in name:
-            marks[name], sds[name] = one.point, keep.found_sd / one.confidence
-    return marks, sds
-
-
 def _coarse(rig: Rig, starts: list[Candidate], named: Mapping[str, Floats],
             keep: RegisterSettings) -> list[RigFit]:  # fmt: skip
     """Coarse fits of the starts that are nearly as good as the best, best first."""
@@ -260,8 +201,10 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
     )
 
 
-def _result(rig: Rig, scan: Surface, fit: RigFit, moved: Offset, tried: list[RigFit],
-            starts: list[Candidate], keep: RegisterSettings, clock: _Clock) -> Registration:  # fmt: skip
+def _result(
+    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, tried: list[RigFit],
+    starts: list[Candidate], keep: RegisterSettings, clock: _Clock,
+) -> Registration:  # fmt: skip
     covariance = uncertainty.of_fit(fit, rig.template)
     warnings = doubts(rig, fit, tried, starts, covariance, keep.doubts)
     history = [value for one in [*tried[:1], fit] for value in one.history]

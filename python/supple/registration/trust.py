@@ -20,7 +20,7 @@ class Doubts:
     seen: float = 0.35  #: least share of the skin of the breasts, and of the front, that is seen
     sd: float = 12e-3  #: largest mean standard deviation of the breasts' vertices
     rival: float = 1.1  #: another pose must be worse than the best by this factor
-    apart: float = 0.08  #: poses that differ by less are one
+    turned: float = 0.6  #: rad; poses that differ by less are one
     at_bounds: float = 0.2  #: largest share of the blend's coefficients at their bounds
 
 
@@ -67,15 +67,12 @@ def _at_bounds(fit: RigFit, bounds: Floats) -> float:
 
 
 def _rival(fit: RigFit, tried: list[RigFit], starts: list[Candidate], limits: Doubts) -> bool:
-    """Whether a pose elsewhere is nearly as good."""
-    if len(tried) == 0 or not starts[0].score:
+    """Whether a pose that is turned by more than ``limits.turned`` is nearly as good."""
+    if not tried or not starts[0].score:
         return False
-    best = np.linalg.norm
-    centre = fit.posture.rotations[0]
     for one in starts[1:]:
-        turned = one.posture.rotations[0] @ centre.T
-        angle = np.arccos(np.clip((np.trace(turned) - 1) / 2, -1, 1))
-        if angle > 0.6 and one.score < limits.rival * starts[0].score:
+        turned = one.posture.rotations[0] @ fit.posture.rotations[0].T
+        angle = float(np.arccos(np.clip((np.trace(turned) - 1) / 2, -1, 1)))
+        if angle > limits.turned and one.score < limits.rival * starts[0].score:
             return True
-    del best
     return False

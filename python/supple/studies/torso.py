@@ -96,7 +96,7 @@ def rows(
         for level in levels(known[case.fitted]):
             if progress is not None:
                 progress(f"{case.key}, {level.sweep} {level.at:g}", number / len(cases))
-            found.append(_row(case, scan, known, level))
+            found.append(row(case, scan, known, level))
     return found
 
 
@@ -143,7 +143,8 @@ def first_shapes(template: Template, count: int) -> Template:
     )  # fmt: skip
 
 
-def _row(case: Case, scan: SyntheticScan, known: Mapping[str, Template], level: Level) -> Row:
+def row(case: Case, scan: SyntheticScan, known: Mapping[str, Template], level: Level) -> Row:
+    """One registration and its errors, mm."""
     found = level.fit(case, scan)
     result = score(found, scan, known[case.scanned])
     return {

@@ -100,7 +100,9 @@ def scan_of(case: Case, known: Mapping[str, Template], **changes: Any) -> Synthe
     )  # fmt: skip
 
 
-def next_frame(case: Case, known: Mapping[str, Template], scan: SyntheticScan) -> SyntheticScan:
+def next_frame(
+    case: Case, known: Mapping[str, Template], scan: SyntheticScan, **changes: Any
+) -> SyntheticScan:
     """Of the same body a moment later: each bone turned by 0.6°, all by 1° and 5 mm."""
     template, random = known[case.scanned], np.random.default_rng(_seed(case))
     before = random_posture(template, case.pose, case.shape)
@@ -109,8 +111,9 @@ def next_frame(case: Case, known: Mapping[str, Template], scan: SyntheticScan) -
     after = _as_far(after, before)
     turn, shift = turned(random, np.degrees(_TURN)), _SHIFT * turned(random, 90.0)[0]
     R, t = turn @ scan.truth.R, scan.truth.t + shift
-    view = {"view": _view(case.pose)["view"]} if case.pose == "supine" else {}
-    return synthetic_scan(template, after, _seed(case) + 1, noise=case.noise, motion=(R, t), **view)
+    view: dict[str, Any] = {"view": "front"} if case.pose == "supine" else {}
+    given: dict[str, Any] = {"noise": case.noise, "motion": (R, t)} | view | changes
+    return synthetic_scan(template, after, _seed(case) + 1, **given)
 
 
 def run(case: Case, known: Mapping[str, Template], warm: bool = False, **given: Any) -> Outcome:

@@ -96,9 +96,9 @@ def _covered(found: Registration, scan: SyntheticScan, off: Floats) -> float:
     """Share of vertices, or of landmarks where vertices do not correspond, inside their band."""
     from ..registration import uncertainty
 
-    given = found.template, found.posture, found.covariance
     if found.covariance is None:
         return float("nan")
+    given = found.template, found.posture, found.covariance
     if off.ndim:
         return float((off <= uncertainty.vertex_uncertainty(*given).radius95).mean())
     names = [name for name in found.template.landmarks if name in scan.truth.landmarks]
