@@ -11,6 +11,8 @@ Floats = npt.NDArray[np.float64]
 _XIPHOID = 0.9
 #: m below the nipple, where the chord ends from which the fold is furthest; and how deep it may be.
 _CHORD, _DEEP = 0.13, 0.10
+#: m around the armpit's apex, where its front fold is.
+_NEAR = 0.08
 
 
 def xiphoid_height(notch: float, fold: float) -> float:
@@ -21,17 +23,22 @@ def xiphoid_height(notch: float, fold: float) -> float:
     return (1 - _XIPHOID) * notch + _XIPHOID * fold
 
 
+def sagittal(points: Floats, triangles: npt.NDArray[np.int64], x: float) -> Floats:
+    """Points (k, 3) m where edges of the skin cross the plane of that ``x`` m, in any order."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    cut = (a[:, 0] < x) != (b[:, 0] < x)
+    share = ((x - a[cut, 0]) / (b[cut, 0] - a[cut, 0]))[:, None]
+    return np.asarray((1 - share) * a[cut] + share * b[cut])
+
+
 def fold_below(points: Floats, triangles: npt.NDArray[np.int64], nipple: Floats) -> Floats:
     """The crease (3,) m under a breast, on an edge of the skin, straight below its ``nipple``.
 
     Where the sagittal section through the nipple is furthest behind the chord from the nipple to
     the chest 13 cm below it.
     """
-    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    a, b = points[edges[:, 0]], points[edges[:, 1]]
-    cut = (a[:, 0] < nipple[0]) != (b[:, 0] < nipple[0])
-    share = ((nipple[0] - a[cut, 0]) / (b[cut, 0] - a[cut, 0]))[:, None]
-    line = (1 - share) * a[cut] + share * b[cut]
+    line = sagittal(points, triangles, float(nipple[0]))
     below = nipple[2] - line[:, 2]
     line = line[(below > 0) & (below < _CHORD) & (line[:, 1] < nipple[1] + _DEEP)]
     lowest = line[line[:, 2].argmin()]
@@ -49,3 +56,62 @@ def level_with(outline: Floats, nipple: Floats) -> tuple[Floats, Floats]:
     points = (1 - share) * outline[cut] + share * after[cut]
     aside = np.abs(points[:, 0])
     return points[aside.argmin()], points[aside.argmax()]
+
+
+def axilla(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
+    """The edge (3,) m of the left anterior axillary fold, on an edge of the skin.
+
+    Straight before the armpit's apex, where the skin turns from facing down to facing forward: of
+    the sagittal section through the apex, the point furthest forward and down alike. The apex is
+    the saddle of the height between arm and trunk, for any body whose arms are away from it.
+    """
+    near = _neighbours(points, triangles)
+    top = _joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)
+    around = near[top] | {far for one in near[top] for far in near[one]}
+    apex = _level_place(points[sorted(around)], points[top])
+    line = sagittal(points, triangles, float(apex[0]))
+    line = line[(line[:, 2] > points[top, 2] - _NEAR / 4) & (line[:, 1] < apex[1])]
+    line = line[np.linalg.norm(line - apex, axis=1) < _NEAR]
+    return np.asarray(line[(line[:, 1] + line[:, 2]).argmin()])
+
+
+def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[int]]:
+    near: list[set[int]] = [set() for _ in points]
+    for a, b in triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist():
+        near[a].add(b)
+        near[b].add(a)
+    return near
+
+
+def _joining(height: Floats, kept: npt.NDArray[np.int64], near: list[set[int]]) -> int:
+    """The vertex where, with the level rising, the deepest second valley meets another.
+
+    Edelsbrunner and Harer (2010), Computational Topology, VII.1: the merge of most persistence.
+    """
+    lowest: dict[int, int] = {}  # of each vertex under water, one nearer to its valley's lowest
+
+    def valley(k: int) -> int:
+        while lowest[k] != k:
+            lowest[k] = k = lowest[lowest[k]]
+        return k
+
+    deepest, chosen = -1.0, -1
+    for k in kept[np.argsort(height[kept], kind="stable")].tolist():
+        met = sorted({valley(j) for j in near[k] if j in lowest}, key=lambda j: height[j])
+        lowest[k] = met[0] if met else k
+        for other in met[1:]:
+            lowest[other] = met[0]
+            if height[k] - height[other] > deepest:
+                deepest, chosen = height[k] - height[other], k
+    return chosen
+
+
+def _level_place(points: Floats, about: Floats) -> Floats:
+    """Where the height of a quadratic in x and y through ``points`` (k, 3) m is stationary."""
+    x, y, z = (points - about).T
+    basis = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], axis=1)
+    fit = np.linalg.lstsq(basis, z, rcond=None)[0]
+    step = -np.linalg.solve([[fit[3], fit[4]], [fit[4], fit[5]]], fit[1:3])
+    step *= min(1.0, float(np.ptp(points, axis=0).max()) / 3 / float(np.linalg.norm(step) + 1e-12))
+    height = np.r_[1.0, step, step[0] ** 2 / 2, step.prod(), step[1] ** 2 / 2] @ fit
+    return np.asarray(about + np.r_[step, height])

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import MeshError
-from supple.registration.landmark_rules import fold_below, level_with, xiphoid_height
+from supple.registration.landmark_rules import axilla, fold_below, level_with, xiphoid_height
 from supple.registration.template import OnSurface
 
 Floats = npt.NDArray[np.float64]
@@ -128,8 +128,8 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
     return skin.nearest(smooth, closed=True)
 
 
-def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> dict[str, OnSurface]:
-    """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight.
+def landmarks(skin: Skin, nipple: Floats, outline: OnSurface) -> dict[str, OnSurface]:
+    """LANDMARKS; ``nipple`` (n,) is how far its targets move.
 
     Nipple: the middle of what moves with the nipple's tip. Medial, lateral: of the breast's outline
     at the nipple's height; inferior: the fold below the nipple. Xiphoid: on the profile, 0.9 of the
@@ -143,7 +143,7 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
     fold = fold_below(skin.points, skin.triangles, summit)
     marks = {
         "nipple": skin.nearest(summit),
-        "axilla": skin.nearest(_axilla(skin, arm)),
+        "axilla": skin.nearest(axilla(skin.points, skin.triangles)),
         "breast_medial": skin.nearest(medial),
         "breast_lateral": skin.nearest(lateral),
         "breast_inferior": skin.nearest(fold),
@@ -170,14 +170,6 @@ def _notch(skin: Skin, below: float) -> Floats:
     chord = np.interp(z, z[[0, -1]], depth(z[[0, -1]]))
     height = float(z[int(np.argmax(depth(z) - chord))])
     return np.asarray(skin.profile(height, height, 1)[0])
-
-
-def _axilla(skin: Skin, arm: Floats) -> Floats:
-    """The anterior axillary fold: the lowest place in front where arm and chest share the skin."""
-    line = skin.outline(arm, 0.45, 400)
-    normal = skin.normals()[skin.nearest(line).triangle]
-    front = line[normal[:, 1] < -0.5]
-    return np.asarray(front[front[:, 2].argmin()])
 
 
 def curves(skin: Skin, marks: dict[str, OnSurface], outline: OnSurface) -> dict[str, OnSurface]:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration import procedural_body as body
-from supple.registration.landmark_rules import fold_below, level_with
+from supple.registration.landmark_rules import axilla, fold_below, level_with
 from supple.registration.procedural_mesh import Skin
 from supple.registration.procedural_rig import BASE, BASE_RADII, arm_part, breast_radius, left
 from supple.registration.template import CURVES, LANDMARKS, OnSurface
@@ -18,7 +18,6 @@ Floats = npt.NDArray[np.float64]
 
 #: Heights of the ends of the sternum, m: the lower is 0.9 of the way down to the breasts' folds.
 NOTCH, XIPHOID = 0.140, -0.055
-AXILLA = (0.156, 0.054)  #: x and z of the left one, m: where arm and chest part in front
 _MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
 _MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
 
@@ -29,7 +28,9 @@ def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
     found |= {"sternum_arrow_upper": _arrow(skin, NOTCH - 0.004, _MEET + 0.010),
               "sternum_arrow_lower": _arrow(skin, XIPHOID + 0.004, _MEET - 0.010)}  # fmt: skip
     fold = fold_below(skin.points, skin.triangles, body.nipple())
-    for name, points in {**_left_places(), "breast_inferior_left": fold[None]}.items():
+    front = axilla(skin.points, skin.triangles)
+    by_shape = {"breast_inferior_left": fold[None], "axilla_left": front[None]}
+    for name, points in {**_left_places(), **by_shape}.items():
         found[name] = _nearest(skin, points, closed=name == "breast_left")
         found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
     return {name: found[name] for name in LANDMARKS}, {name: found[name] for name in CURVES}
@@ -85,9 +86,6 @@ def _left_places() -> dict[str, Floats]:
     medial, lateral = level_with(line, nipple)
     return {
         "nipple_left": nipple[None],
-        "axilla_left": body.met(
-            np.array([[AXILLA[0], -0.2, AXILLA[1]]]), np.array([0.0, 1.0, 0.0])
-        ),
         "breast_medial_left": medial[None],
         "breast_lateral_left": lateral[None],
         "breast_left": line,

@@ -17,8 +17,8 @@ Ints = npt.NDArray[np.int64]
 
 ARM_END, NECK_END, WAIST_END = 0.170, 0.100, -0.300  #: cuts: along arm and neck, and a height, m
 _CELL = 0.010  # of marching cubes, m
-_ARMPIT = np.array([0.160, 0.015, 0.025])  # where weights change within few edges, m
-_LOW, _HIGH = (-0.17, -0.32), (0.15, 0.28)  # the box in y and z; x from 0 to 0.30
+_ARMPIT = np.array([0.152, 0.000, 0.045])  # where weights change within few edges, m
+_LOW, _HIGH = (-0.17, -0.32), (0.15, 0.28)  # the box in y and z; x from 0 to 0.33
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def _marched() -> tuple[Floats, Ints]:
     from skimage.measure import marching_cubes
 
     axes = [
-        np.arange(a, b + _CELL, _CELL) for a, b in zip((0.0, *_LOW), (0.30, *_HIGH), strict=True)
+        np.arange(a, b + _CELL, _CELL) for a, b in zip((0.0, *_LOW), (0.33, *_HIGH), strict=True)
     ]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = body.level(grid.reshape(-1, 3)).reshape(grid.shape[:3])
