@@ -11,8 +11,33 @@ Floats = npt.NDArray[np.float64]
 _XIPHOID = 0.9
 #: m below the nipple, where the chord ends from which the fold is furthest; and how deep it may be.
 _CHORD, _DEEP = 0.13, 0.10
+#: mm along the profile over which it turns at the notch.
+_ARM = 30
 #: m around the armpit's apex, where its front fold is.
 _NEAR = 0.08
+
+
+def notch_height(points: Floats, nipple: float) -> float:
+    """Height of the sternal notch, m: where the front's profile turns most from chest to neck.
+
+    Between points 30 mm before and after it on a spline through the vertices at x = 0, above the
+    height of the nipples.
+    """
+    from scipy.interpolate import CubicSpline
+
+    middle = points[np.abs(points[:, 0]) < 1e-9]
+    front = middle[middle[:, 1] < np.median(middle[:, 1])]
+    front = front[np.argsort(front[:, 2])]
+    z = np.arange(front[0, 2], front[-1, 2], 5e-4)
+    line = np.stack([CubicSpline(front[:, 2], front[:, 1])(z), z], axis=1)
+    length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+    even = np.arange(0, length[-1], 1e-3)
+    y, z = (np.interp(even, length, column) for column in line.T)
+    step = np.stack([y[_ARM:] - y[:-_ARM], z[_ARM:] - z[:-_ARM]])
+    before, after = step[:, :-_ARM], step[:, _ARM:]
+    turn = np.arctan2(before[0] * after[1] - before[1] * after[0], (before * after).sum(axis=0))
+    place = z[_ARM:-_ARM]
+    return float(place[np.where(place > nipple, turn, -np.inf).argmax()])
 
 
 def xiphoid_height(notch: float, fold: float) -> float:
@@ -38,7 +63,11 @@ def fold_below(points: Floats, triangles: npt.NDArray[np.int64], nipple: Floats)
     Where the sagittal section through the nipple is furthest behind the chord from the nipple to
     the chest 13 cm below it.
     """
-    line = sagittal(points, triangles, float(nipple[0]))
+    return fold_of(sagittal(points, triangles, float(nipple[0])), nipple)
+
+
+def fold_of(line: Floats, nipple: Floats) -> Floats:
+    """The crease (3,) m of a sagittal section ``line`` (k, 3) m through the ``nipple``."""
     below = nipple[2] - line[:, 2]
     line = line[(below > 0) & (below < _CHORD) & (line[:, 1] < nipple[1] + _DEEP)]
     lowest = line[line[:, 2].argmin()]
@@ -65,14 +94,27 @@ def axilla(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
     the sagittal section through the apex, the point furthest forward and down alike. The apex is
     the saddle of the height between arm and trunk, for any body whose arms are away from it.
     """
+    apex = armpit(points, triangles)
+    return fold_before(sagittal(points, triangles, float(apex[0])), apex)
+
+
+def fold_before(line: Floats, apex: Floats) -> Floats:
+    """The edge (3,) m of the fold in a sagittal section ``line`` (k, 3) m through the ``apex``."""
+    line = line[(line[:, 2] > apex[2] - _NEAR / 4) & (line[:, 1] < apex[1])]
+    line = line[np.linalg.norm(line - apex, axis=1) < _NEAR]
+    return np.asarray(line[(line[:, 1] + line[:, 2]).argmin()])
+
+
+def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
+    """The apex (3,) m of the left armpit, near the skin: the saddle between arm and trunk.
+
+    The vertex that joins the two deepest valleys of the left half, then the saddle of a quadratic
+    through its surroundings.
+    """
     near = _neighbours(points, triangles)
     top = _joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)
     around = near[top] | {far for one in near[top] for far in near[one]}
-    apex = _level_place(points[sorted(around)], points[top])
-    line = sagittal(points, triangles, float(apex[0]))
-    line = line[(line[:, 2] > points[top, 2] - _NEAR / 4) & (line[:, 1] < apex[1])]
-    line = line[np.linalg.norm(line - apex, axis=1) < _NEAR]
-    return np.asarray(line[(line[:, 1] + line[:, 2]).argmin()])
+    return _level_place(points[sorted(around)], points[top])
 
 
 def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[int]]:

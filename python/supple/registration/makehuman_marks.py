@@ -8,7 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import MeshError
-from supple.registration.landmark_rules import axilla, fold_below, level_with, xiphoid_height
+from supple.registration.landmark_rules import (
+    axilla,
+    fold_below,
+    level_with,
+    notch_height,
+    xiphoid_height,
+)
 from supple.registration.template import OnSurface
 
 Floats = npt.NDArray[np.float64]
@@ -148,28 +154,13 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface) -> dict[str, OnSur
         "breast_lateral": skin.nearest(lateral),
         "breast_inferior": skin.nearest(fold),
     }
-    notch = _notch(skin, float(skin.at(marks["nipple"])[0, 2]))
-    end = xiphoid_height(float(notch[2]), float(fold[2]))
-    result = {"sternal_notch": skin.nearest(notch),
+    top = notch_height(skin.points, float(summit[2]))
+    end = xiphoid_height(top, float(fold[2]))
+    result = {"sternal_notch": skin.nearest(skin.profile(top, top, 1)),
               "xiphoid": skin.nearest(skin.profile(end, end, 1))}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
-
-
-def _notch(skin: Skin, below: float) -> Floats:
-    """Where the profile lies deepest behind its chord from the neck's cut to the height ``below``.
-
-    A spline through the profile's vertices, so that it does not depend on how fine they are.
-    """
-    from scipy.interpolate import CubicSpline
-
-    line = skin.middle(front=True)
-    depth = CubicSpline(line[:, 2], line[:, 1])
-    z = np.arange(below, line[-1, 2], 1e-4)
-    chord = np.interp(z, z[[0, -1]], depth(z[[0, -1]]))
-    height = float(z[int(np.argmax(depth(z) - chord))])
-    return np.asarray(skin.profile(height, height, 1)[0])
 
 
 def curves(skin: Skin, marks: dict[str, OnSurface], outline: OnSurface) -> dict[str, OnSurface]:
