@@ -106,15 +106,12 @@ def fold_before(line: Floats, apex: Floats) -> Floats:
 
 
 def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
-    """The apex (3,) m of the left armpit, near the skin: the saddle between arm and trunk.
+    """The apex (3,) m of the left armpit: the saddle vertex of the height between arm and trunk.
 
-    The vertex that joins the two deepest valleys of the left half, then the saddle of a quadratic
-    through its surroundings.
+    It joins the two deepest valleys of the left half.
     """
     near = _neighbours(points, triangles)
-    top = _joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)
-    around = near[top] | {far for one in near[top] for far in near[one]}
-    return _level_place(points[sorted(around)], points[top])
+    return points[_joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)]
 
 
 def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[int]]:
@@ -146,14 +143,3 @@ def _joining(height: Floats, kept: npt.NDArray[np.int64], near: list[set[int]]) 
             if height[k] - height[other] > deepest:
                 deepest, chosen = height[k] - height[other], k
     return chosen
-
-
-def _level_place(points: Floats, about: Floats) -> Floats:
-    """Where the height of a quadratic in x and y through ``points`` (k, 3) m is stationary."""
-    x, y, z = (points - about).T
-    basis = np.stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2], axis=1)
-    fit = np.linalg.lstsq(basis, z, rcond=None)[0]
-    step = -np.linalg.solve([[fit[3], fit[4]], [fit[4], fit[5]]], fit[1:3])
-    step *= min(1.0, float(np.ptp(points, axis=0).max()) / 3 / float(np.linalg.norm(step) + 1e-12))
-    height = np.r_[1.0, step, step[0] ** 2 / 2, step.prod(), step[1] ** 2 / 2] @ fit
-    return np.asarray(about + np.r_[step, height])
