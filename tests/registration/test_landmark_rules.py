@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from supple.registration.landmark_rules import fold_below, level_with
+from supple.registration.landmark_rules import axilla, fold_below, level_with, notch_height
 from supple.registration.makehuman import torso as makehuman
 from supple.registration.procedural import torso as procedural
 
@@ -22,6 +22,11 @@ def test_a_template_s_landmarks_are_where_the_rules_put_them(name, request):
     else:
         template = procedural()
     at, curves = template.landmark_points(), template.curve_points()
+    top = notch_height(template.points, float(at["nipple_left"][2]))
+    assert at["sternal_notch"][2] == pytest.approx(top, abs=6e-3)
+    edge = axilla(template.points, template.triangles)
+    for side, sign in (("left", 1), ("right", -1)):
+        assert np.linalg.norm(at[f"axilla_{side}"] - edge * (sign, 1, 1)) < 6e-3
     fold = (at["breast_inferior_left"][2] + at["breast_inferior_right"][2]) / 2
     assert at["xiphoid"][2] == pytest.approx(0.1 * at["sternal_notch"][2] + 0.9 * fold, abs=6e-3)
     for side, sign in (("left", 1), ("right", -1)):
@@ -40,6 +45,34 @@ def test_level_points_of_a_circle_are_its_chord():
     inner, outer = level_with(circle, np.array([2.0, 0.0, 0.6]))
     assert np.allclose(inner, (1.2, 0, 0.6), atol=1e-4)
     assert np.allclose(outer, (2.8, 0, 0.6), atol=1e-4)
+
+
+def test_the_notch_is_the_corner_of_two_slopes():
+    """A chest that recedes by 40°, a neck that leans forward by 20°, on a back: their corner."""
+    z = np.linspace(-0.15, 0.09, 49)
+    depth = np.where(z < 0, z * np.tan(np.radians(40)), -z * np.tan(np.radians(20)))
+    front = np.column_stack([0 * z, depth - 0.05, z])
+    assert notch_height(np.vstack([front, front * (1, 0, 1) + (0, 0.2, 0)]), -0.1) == pytest.approx(
+        0, abs=2e-3
+    )
+
+
+def test_the_axilla_is_the_front_edge_under_an_arch():
+    """A roof z = 0.1 - x² / 0.1 over a gap, its front edge rounded with a radius of 2 cm.
+
+    At 45° on that quarter circle: behind its front, and above its lowest line, by r (1 - √½).
+    """
+    x = np.linspace(-0.08, 0.08, 33)
+    angle = np.radians(np.linspace(0, 90, 31))
+    y = np.r_[-0.02 * np.sin(angle[::-1]), np.linspace(0.005, 0.08, 16)]
+    lift = np.r_[0.02 * (1 - np.cos(angle[::-1])), 0.05 * np.linspace(0.005, 0.08, 16) ** 2]
+    points = np.array([(a + 0.2, b, 0.1 - a * a / 0.1 + c)
+                       for a in x for b, c in zip(y, lift, strict=True)])  # fmt: skip
+    k = np.arange(len(points)).reshape(len(x), -1)
+    a, b, c, d = k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]
+    triangles = np.vstack([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    r = 0.02 * np.sqrt(0.5)
+    assert np.allclose(axilla(points, triangles), (0.2, -r, 0.12 - r), atol=2e-3)
 
 
 def test_the_fold_of_a_step_is_its_inner_corner():

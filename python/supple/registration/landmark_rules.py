@@ -11,6 +11,33 @@ Floats = npt.NDArray[np.float64]
 _XIPHOID = 0.9
 #: m below the nipple, where the chord ends from which the fold is furthest; and how deep it may be.
 _CHORD, _DEEP = 0.13, 0.10
+#: mm along the profile over which it turns at the notch.
+_ARM = 30
+#: m around the armpit's apex, where its front fold is.
+_NEAR = 0.08
+
+
+def notch_height(points: Floats, nipple: float) -> float:
+    """Height of the sternal notch, m: where the front's profile turns most from chest to neck.
+
+    Between points 30 mm before and after it on a spline through the vertices at x = 0, above the
+    height of the nipples.
+    """
+    from scipy.interpolate import CubicSpline
+
+    middle = points[np.abs(points[:, 0]) < 1e-9]
+    front = middle[middle[:, 1] < np.median(middle[:, 1])]
+    front = front[np.argsort(front[:, 2])]
+    z = np.arange(front[0, 2], front[-1, 2], 5e-4)
+    line = np.stack([CubicSpline(front[:, 2], front[:, 1])(z), z], axis=1)
+    length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+    even = np.arange(0, length[-1], 1e-3)
+    y, z = (np.interp(even, length, column) for column in line.T)
+    step = np.stack([y[_ARM:] - y[:-_ARM], z[_ARM:] - z[:-_ARM]])
+    before, after = step[:, :-_ARM], step[:, _ARM:]
+    turn = np.arctan2(before[0] * after[1] - before[1] * after[0], (before * after).sum(axis=0))
+    place = z[_ARM:-_ARM]
+    return float(place[np.where(place > nipple, turn, -np.inf).argmax()])
 
 
 def xiphoid_height(notch: float, fold: float) -> float:
@@ -21,17 +48,26 @@ def xiphoid_height(notch: float, fold: float) -> float:
     return (1 - _XIPHOID) * notch + _XIPHOID * fold
 
 
+def sagittal(points: Floats, triangles: npt.NDArray[np.int64], x: float) -> Floats:
+    """Points (k, 3) m where edges of the skin cross the plane of that ``x`` m, in any order."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    cut = (a[:, 0] < x) != (b[:, 0] < x)
+    share = ((x - a[cut, 0]) / (b[cut, 0] - a[cut, 0]))[:, None]
+    return np.asarray((1 - share) * a[cut] + share * b[cut])
+
+
 def fold_below(points: Floats, triangles: npt.NDArray[np.int64], nipple: Floats) -> Floats:
     """The crease (3,) m under a breast, on an edge of the skin, straight below its ``nipple``.
 
     Where the sagittal section through the nipple is furthest behind the chord from the nipple to
     the chest 13 cm below it.
     """
-    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    a, b = points[edges[:, 0]], points[edges[:, 1]]
-    cut = (a[:, 0] < nipple[0]) != (b[:, 0] < nipple[0])
-    share = ((nipple[0] - a[cut, 0]) / (b[cut, 0] - a[cut, 0]))[:, None]
-    line = (1 - share) * a[cut] + share * b[cut]
+    return fold_of(sagittal(points, triangles, float(nipple[0])), nipple)
+
+
+def fold_of(line: Floats, nipple: Floats) -> Floats:
+    """The crease (3,) m of a sagittal section ``line`` (k, 3) m through the ``nipple``."""
     below = nipple[2] - line[:, 2]
     line = line[(below > 0) & (below < _CHORD) & (line[:, 1] < nipple[1] + _DEEP)]
     lowest = line[line[:, 2].argmin()]
@@ -49,3 +85,61 @@ def level_with(outline: Floats, nipple: Floats) -> tuple[Floats, Floats]:
     points = (1 - share) * outline[cut] + share * after[cut]
     aside = np.abs(points[:, 0])
     return points[aside.argmin()], points[aside.argmax()]
+
+
+def axilla(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
+    """The edge (3,) m of the left anterior axillary fold, on an edge of the skin.
+
+    Straight before the armpit's apex, where the skin turns from facing down to facing forward: of
+    the sagittal section through the apex, the point furthest forward and down alike. The apex is
+    the saddle of the height between arm and trunk, for any body whose arms are away from it.
+    """
+    apex = armpit(points, triangles)
+    return fold_before(sagittal(points, triangles, float(apex[0])), apex)
+
+
+def fold_before(line: Floats, apex: Floats) -> Floats:
+    """The edge (3,) m of the fold in a sagittal section ``line`` (k, 3) m through the ``apex``."""
+    line = line[(line[:, 2] > apex[2] - _NEAR / 4) & (line[:, 1] < apex[1])]
+    line = line[np.linalg.norm(line - apex, axis=1) < _NEAR]
+    return np.asarray(line[(line[:, 1] + line[:, 2]).argmin()])
+
+
+def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
+    """The apex (3,) m of the left armpit: the saddle vertex of the height between arm and trunk.
+
+    It joins the two deepest valleys of the left half.
+    """
+    near = _neighbours(points, triangles)
+    return points[_joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)]
+
+
+def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[int]]:
+    near: list[set[int]] = [set() for _ in points]
+    for a, b in triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist():
+        near[a].add(b)
+        near[b].add(a)
+    return near
+
+
+def _joining(height: Floats, kept: npt.NDArray[np.int64], near: list[set[int]]) -> int:
+    """The vertex where, with the level rising, the deepest second valley meets another.
+
+    Edelsbrunner and Harer (2010), Computational Topology, VII.1: the merge of most persistence.
+    """
+    lowest: dict[int, int] = {}  # of each vertex under water, one nearer to its valley's lowest
+
+    def valley(k: int) -> int:
+        while lowest[k] != k:
+            lowest[k] = k = lowest[lowest[k]]
+        return k
+
+    deepest, chosen = -1.0, -1
+    for k in kept[np.argsort(height[kept], kind="stable")].tolist():
+        met = sorted({valley(j) for j in near[k] if j in lowest}, key=lambda j: height[j])
+        lowest[k] = met[0] if met else k
+        for other in met[1:]:
+            lowest[other] = met[0]
+            if height[k] - height[other] > deepest:
+                deepest, chosen = height[k] - height[other], k
+    return chosen

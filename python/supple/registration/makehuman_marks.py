@@ -8,7 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import MeshError
-from supple.registration.landmark_rules import fold_below, level_with, xiphoid_height
+from supple.registration.landmark_rules import (
+    axilla,
+    fold_below,
+    level_with,
+    notch_height,
+    xiphoid_height,
+)
 from supple.registration.template import OnSurface
 
 Floats = npt.NDArray[np.float64]
@@ -128,8 +134,8 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
     return skin.nearest(smooth, closed=True)
 
 
-def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> dict[str, OnSurface]:
-    """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``arm`` (n,) its bone's weight.
+def landmarks(skin: Skin, nipple: Floats, outline: OnSurface) -> dict[str, OnSurface]:
+    """LANDMARKS; ``nipple`` (n,) is how far its targets move.
 
     Nipple: the middle of what moves with the nipple's tip. Medial, lateral: of the breast's outline
     at the nipple's height; inferior: the fold below the nipple. Xiphoid: on the profile, 0.9 of the
@@ -143,41 +149,18 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface, arm: Floats) -> di
     fold = fold_below(skin.points, skin.triangles, summit)
     marks = {
         "nipple": skin.nearest(summit),
-        "axilla": skin.nearest(_axilla(skin, arm)),
+        "axilla": skin.nearest(axilla(skin.points, skin.triangles)),
         "breast_medial": skin.nearest(medial),
         "breast_lateral": skin.nearest(lateral),
         "breast_inferior": skin.nearest(fold),
     }
-    notch = _notch(skin, float(skin.at(marks["nipple"])[0, 2]))
-    end = xiphoid_height(float(notch[2]), float(fold[2]))
-    result = {"sternal_notch": skin.nearest(notch),
+    top = notch_height(skin.points, float(summit[2]))
+    end = xiphoid_height(top, float(fold[2]))
+    result = {"sternal_notch": skin.nearest(skin.profile(top, top, 1)),
               "xiphoid": skin.nearest(skin.profile(end, end, 1))}  # fmt: skip
     for name, mark in marks.items():
         result |= {f"{name}_left": mark, f"{name}_right": skin.image(mark)}
     return result
-
-
-def _notch(skin: Skin, below: float) -> Floats:
-    """Where the profile lies deepest behind its chord from the neck's cut to the height ``below``.
-
-    A spline through the profile's vertices, so that it does not depend on how fine they are.
-    """
-    from scipy.interpolate import CubicSpline
-
-    line = skin.middle(front=True)
-    depth = CubicSpline(line[:, 2], line[:, 1])
-    z = np.arange(below, line[-1, 2], 1e-4)
-    chord = np.interp(z, z[[0, -1]], depth(z[[0, -1]]))
-    height = float(z[int(np.argmax(depth(z) - chord))])
-    return np.asarray(skin.profile(height, height, 1)[0])
-
-
-def _axilla(skin: Skin, arm: Floats) -> Floats:
-    """The anterior axillary fold: the lowest place in front where arm and chest share the skin."""
-    line = skin.outline(arm, 0.45, 400)
-    normal = skin.normals()[skin.nearest(line).triangle]
-    front = line[normal[:, 1] < -0.5]
-    return np.asarray(front[front[:, 2].argmin()])
 
 
 def curves(skin: Skin, marks: dict[str, OnSurface], outline: OnSurface) -> dict[str, OnSurface]:

@@ -24,6 +24,8 @@ def torso(spacing: float = 0.024) -> Template:
     """
     made = skin(spacing)
     landmarks, curves = marks(made)
+    ends = [float(landmarks[name].at(made.points, made.triangles)[0, 2])
+            for name in ("sternal_notch", "xiphoid")]  # fmt: skip
     shapes, names = blendshapes(made)
     return Template(
         points=made.points,
@@ -35,7 +37,7 @@ def torso(spacing: float = 0.024) -> Template:
         blendshape_bounds=bounds(names),
         landmarks=landmarks,
         curves=curves,
-        regions=regions(made.points),
+        regions=regions(made.points, *ends),
         mirror=made.mirror,
         name="procedural torso",
         source="Supple; made by code after published anthropometry.",

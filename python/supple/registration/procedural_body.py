@@ -35,9 +35,9 @@ _TRUNK = np.array([
 ])  # fmt: skip
 
 SHOULDER = np.array([0.162, 0.024, 0.110])  #: centre of the left humeral head, m
-ARM = np.array([0.44, 0.02, -0.90]) / np.linalg.norm([0.44, 0.02, -0.90])  #: along the left arm
+ARM = np.array([0.62, 0.02, -0.78]) / np.linalg.norm([0.62, 0.02, -0.78])  #: along the left arm
 NECK = np.array([0.0, 0.040, 0.150])  #: base of the neck, m
-NECK_AXIS = np.array([0.0, -0.17, 0.985]) / np.linalg.norm([0.17, 0.985])
+NECK_AXIS = np.array([0.0, -0.29, 0.957]) / np.linalg.norm([0.29, 0.957])
 BREAST = np.array([0.085, -0.092, -0.008])  #: centre of the left breast's base, m
 _OUT = np.radians(17.0)  # by which breasts look to the side
 BREAST_AXES = np.array([
@@ -53,7 +53,10 @@ def level(points: Floats) -> Floats:
     p = np.stack([np.hypot(points[:, 0], 0.006), points[:, 1], points[:, 2]], axis=1)
     body = smooth_min(trunk(p), shoulder_girdle(p), 0.05)
     body = smooth_min(body, neck(p), 0.035)
-    body = smooth_min(body, arm(p), 0.040)
+    # the armpit is a narrow cleft, the front of the shoulder a soft hollow
+    softness = 0.024 + 0.016 / (1 + np.exp(-(p[:, 2] - 0.075) / 0.010))
+    body = smooth_min(body, arm(p), softness)
+    body = smooth_min(body, pectoral(p), 0.030)
     return smooth_min(body, *breast(p))
 
 
@@ -119,16 +122,20 @@ def shoulder_girdle(p: Floats) -> Floats:
 
 def neck(p: Floats) -> Floats:
     """A slightly flat, forward-leaning cylinder."""
-    return cone(
-        p, (0.0, 0.022, 0.120), tuple(np.add((0.0, 0.022, 0.120), 0.28 * NECK_AXIS)), 0.055, 0.0515
-    )
+    base = np.array([0.0, 0.028, 0.120])
+    return cone(p, tuple(base), tuple(base + 0.28 * NECK_AXIS), 0.055, 0.0515)
 
 
 def arm(p: Floats) -> Floats:
     """Deltoid and upper arm, |x| taken."""
     upper = cone(p, tuple(SHOULDER), tuple(SHOULDER + 0.30 * ARM), 0.048, 0.041)
     deltoid = ellipsoid(p - (SHOULDER + 0.040 * ARM), (0.048, 0.053, 0.086))
-    return smooth_min(upper, deltoid, 0.03)
+    return smooth_min(upper, deltoid, 0.015)
+
+
+def pectoral(p: Floats) -> Floats:
+    """The muscle's edge from chest to arm, which makes the fold before the armpit."""
+    return cone(p, (0.105, -0.036, 0.082), (0.185, -0.004, 0.076), 0.032, 0.034)
 
 
 def breast(p: Floats) -> tuple[Floats, Floats]:

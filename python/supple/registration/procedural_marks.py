@@ -8,7 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration import procedural_body as body
-from supple.registration.landmark_rules import fold_below, level_with
+from supple.registration.landmark_rules import (
+    armpit,
+    fold_before,
+    fold_of,
+    level_with,
+    notch_height,
+    xiphoid_height,
+)
 from supple.registration.procedural_mesh import Skin
 from supple.registration.procedural_rig import BASE, BASE_RADII, arm_part, breast_radius, left
 from supple.registration.template import CURVES, LANDMARKS, OnSurface
@@ -16,27 +23,57 @@ from supple.surface import Surface
 
 Floats = npt.NDArray[np.float64]
 
-#: Heights of the ends of the sternum, m: the lower is 0.9 of the way down to the breasts' folds.
-NOTCH, XIPHOID = 0.140, -0.055
-AXILLA = (0.156, 0.054)  #: x and z of the left one, m: where arm and chest part in front
-_MEET = (NOTCH + XIPHOID) / 2  # where the arrows point at each other
-_MIDDLE = {"sternal_notch": NOTCH, "xiphoid": XIPHOID}
-
 
 def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
     """Landmarks and curves on the triangles of ``skin``; those on the right are mirror images."""
-    found = {name: _on_midline(skin, np.array([z])) for name, z in _MIDDLE.items()}
-    found |= {"sternum_arrow_upper": _arrow(skin, NOTCH - 0.004, _MEET + 0.010),
-              "sternum_arrow_lower": _arrow(skin, XIPHOID + 0.004, _MEET - 0.010)}  # fmt: skip
-    fold = fold_below(skin.points, skin.triangles, body.nipple())
-    for name, points in {**_left_places(), "breast_inferior_left": fold[None]}.items():
+    fold = fold_of(_section(body.nipple(), -0.13, 0.0), body.nipple())
+    top, low = sternum(skin.points, float(fold[2]))
+    meet = (top + low) / 2  # where the arrows point at each other
+    found = {"sternal_notch": _on_midline(skin, np.array([top])),
+             "xiphoid": _on_midline(skin, np.array([low])),
+             "sternum_arrow_upper": _arrow(skin, top, meet + 0.005),
+             "sternum_arrow_lower": _arrow(skin, low, meet - 0.005)}  # fmt: skip
+    apex = _saddle(armpit(skin.points, skin.triangles))
+    front = fold_before(_section(apex, -0.01, 0.08), apex)
+    by_shape = {"breast_inferior_left": fold[None], "axilla_left": front[None]}
+    for name, points in {**_left_places(), **by_shape}.items():
         found[name] = _nearest(skin, points, closed=name == "breast_left")
         found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
     return {name: found[name] for name in LANDMARKS}, {name: found[name] for name in CURVES}
 
 
-def regions(points: Floats) -> dict[str, npt.NDArray[np.bool_]]:
-    """Masks (n,) of the parts of the skin at ``points`` (n, 3) m."""
+def sternum(points: Floats, fold: float) -> tuple[float, float]:
+    """Heights of the notch and the xiphoid, m; ``fold`` is that of the folds under the breasts."""
+    top = notch_height(points, float(body.nipple()[2]))
+    return top, xiphoid_height(top, fold)
+
+
+def _saddle(near: Floats) -> Floats:
+    """Where the closed form's skin faces straight down, (3,) m, ``near`` a point of the mesh."""
+    from scipy.optimize import fsolve
+
+    def off(p: Floats) -> Floats:
+        return np.r_[body.level(p[None]), 0.01 * body.slope(p[None], 1e-4)[0, :2]]
+
+    return np.asarray(fsolve(off, near))
+
+
+def _section(through: Floats, low: float, high: float) -> Floats:
+    """The front's sagittal section (k, 3) m from ``low`` to ``high`` m above a point.
+
+    Of the closed form, so that it does not depend on the mesh.
+    """
+    height = through[2] + np.arange(low, high, 1e-3)
+    start = np.stack([np.full_like(height, through[0]), np.full_like(height, -0.3), height], 1)
+    line = body.met(start, np.array([0.0, 1.0, 0.0]))
+    return np.asarray(line[np.abs(body.level(line)) < 1e-3])
+
+
+def regions(points: Floats, notch: float, xiphoid: float) -> dict[str, npt.NDArray[np.bool_]]:
+    """Masks (n,) of the parts of the skin at ``points`` (n, 3) m.
+
+    The sternum is between the heights ``notch`` and ``xiphoid``, m.
+    """
     p = left(points)
     n = body.normals(points)
     arm, breast = arm_part(p) > 0.5, breast_radius(p) < 1
@@ -44,12 +81,12 @@ def regions(points: Floats) -> dict[str, npt.NDArray[np.bool_]]:
     trunk = ~arm & ~neck
     front = (n[:, 1] < 0) & trunk
     on_left, on_right = points[:, 0] > 0, points[:, 0] < 0
-    sternum = front & (p[:, 0] < 0.025) & (p[:, 2] < NOTCH) & (p[:, 2] > XIPHOID)
+    bone = front & (p[:, 0] < 0.025) & (p[:, 2] < notch) & (p[:, 2] > xiphoid)
     back = (n[:, 1] > 0.25) & (p[:, 1] > 0.02) & trunk
     return {
         "breast_left": breast & trunk & on_left,
         "breast_right": breast & trunk & on_right,
-        "sternum": sternum,
+        "sternum": bone,
         "back": back,
         "abdomen": front & (p[:, 2] < -0.09),
         "neck": neck,
@@ -85,9 +122,6 @@ def _left_places() -> dict[str, Floats]:
     medial, lateral = level_with(line, nipple)
     return {
         "nipple_left": nipple[None],
-        "axilla_left": body.met(
-            np.array([[AXILLA[0], -0.2, AXILLA[1]]]), np.array([0.0, 1.0, 0.0])
-        ),
         "breast_medial_left": medial[None],
         "breast_lateral_left": lateral[None],
         "breast_left": line,

@@ -15,10 +15,11 @@ from supple.registration import procedural_body as body
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-ARM_END, NECK_END, WAIST_END = 0.170, 0.100, -0.300  #: cuts: along arm and neck, and a height, m
+ARM_END, NECK_END, WAIST_END = 0.170, 0.112, -0.300  #: cuts: along arm and neck, and a height, m
 _CELL = 0.010  # of marching cubes, m
-_ARMPIT = np.array([0.160, 0.015, 0.025])  # where weights change within few edges, m
-_LOW, _HIGH = (-0.17, -0.32), (0.15, 0.28)  # the box in y and z; x from 0 to 0.30
+_NOTCH = np.array([0.0, -0.042, 0.155])  # where the profile turns sharply, m
+_ARMPIT = np.array([0.148, 0.022, 0.036])  # where weights change within few edges, m
+_LOW, _HIGH = (-0.17, -0.32), (0.15, 0.28)  # the box in y and z; x from 0 to 0.33
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,8 @@ def sizes(points: Floats, spacing: float) -> Floats:
     q = (points - body.BREAST) @ body.BREAST_AXES.T
     far = np.linalg.norm(q / (0.085, 0.085, 0.085), axis=1)
     near = 1 / (1 + np.exp((far - 1.15) / 0.12))
-    near = np.maximum(near, 0.5 * np.exp(-((points - _ARMPIT) ** 2).sum(axis=1) / 0.05**2))
+    near = np.maximum(near, 0.9 * np.exp(-((points - _ARMPIT) ** 2).sum(axis=1) / 0.05**2))
+    near = np.maximum(near, 1.1 * np.exp(-((points - _NOTCH) ** 2).sum(axis=1) / 0.03**2))
     tip = np.exp(-(((q[:, :2] - body.NIPPLE[:2]) ** 2).sum(axis=1) / 0.014**2)) * (q[:, 2] > 0)
     return np.asarray(spacing * (1 - 0.47 * near) * (1 - 0.50 * tip))
 
@@ -57,7 +59,7 @@ def _marched() -> tuple[Floats, Ints]:
     from skimage.measure import marching_cubes
 
     axes = [
-        np.arange(a, b + _CELL, _CELL) for a, b in zip((0.0, *_LOW), (0.30, *_HIGH), strict=True)
+        np.arange(a, b + _CELL, _CELL) for a, b in zip((0.0, *_LOW), (0.33, *_HIGH), strict=True)
     ]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = body.level(grid.reshape(-1, 3)).reshape(grid.shape[:3])
