@@ -64,10 +64,12 @@ def test_cold_solves_are_those_one_by_one_to_the_last_bit(processes: int) -> Non
 def test_warm_solves_meet_the_cold_ones_to_the_tolerance_in_fewer_iterations(
     processes: int | None,
 ) -> None:
-    found = body().solve_many([{"young": y} for y in YOUNGS], processes)
-    for state, u in zip(found, one_by_one(), strict=True):
-        assert np.abs(state.u - u).max() <= 1e-8 * state.mesh.size
-    cold = body().solve_many([{"young": y} for y in YOUNGS], processes=1, warm=False)
+    """Moduli a hundredth apart: from those further off Newton needs as many as from zero."""
+    entries = [{"young": young} for young in np.linspace(9.7e3, 1.03e4, 7)]
+    found = body().solve_many(entries, processes)
+    cold = body().solve_many(entries, processes=1, warm=False)
+    for state, alone in zip(found, cold, strict=True):
+        assert np.abs(state.u - alone.u).max() <= 1e-8 * state.mesh.size
     assert sum(s.iterations for s in found) < sum(s.iterations for s in cold)
 
 
