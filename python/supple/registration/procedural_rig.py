@@ -55,10 +55,9 @@ def _split(whole: Floats, share: Floats) -> tuple[Floats, Floats]:
 
 
 def _on_side(name: str, points: Floats) -> Floats:
-    x = points[:, 0]
-    if name.endswith("_left"):
-        return np.asarray((x > 0).astype(float))
-    return np.asarray((x < 0).astype(float) if name.endswith("_right") else np.ones(len(x)))
+    """1 on the bone's own side, 0 on the other, ½ on the midline."""
+    sign = {"left": 1, "right": -1}.get(name.split("_")[-1], 0)
+    return np.asarray(np.heaviside(sign * points[:, 0], 0.5) if sign else np.ones(len(points)))
 
 
 def left(points: Floats) -> Floats:
@@ -69,7 +68,7 @@ def left(points: Floats) -> Floats:
 def smooth(t: Floats) -> Floats:
     """From 0 at t ≤ 0 to 1 at t ≥ 1, twice differentiable (Perlin's polynomial)."""
     t = np.clip(t, 0, 1)
-    return np.asarray(t**3 * (10 - 15 * t + 6 * t**2))
+    return np.asarray(np.clip(t**3 * (10 - 15 * t + 6 * t**2), 0, 1))  # above 1 by rounding else
 
 
 def arm_part(p: Floats) -> Floats:
