@@ -13,7 +13,8 @@ double energy_of(const std::vector<Row>& rows, const Points& vertices) {
   return sum;
 }
 
-void NormalSum::add(const std::vector<Row>& rows, const SkinState& state, Normal& normal) {
+void NormalSum::add(const std::vector<Row>& rows, const SkinState& state, Normal& normal,
+                    Unknowns of) {
   const int unknowns = state.rig.unknowns();
   const int count = static_cast<int>(rows.size());
 #pragma omp parallel for schedule(dynamic, 1)
@@ -23,7 +24,8 @@ void NormalSum::add(const std::vector<Row>& rows, const SkinState& state, Normal
     part.gradient.setZero(unknowns);
     part.place.assign(static_cast<std::size_t>(unknowns), -1);
     for (int begin = s * kChunk; begin < count; begin += kSums * kChunk)
-      add_chunk(rows.data() + begin, rows.data() + std::min(begin + kChunk, count), state, part);
+      add_chunk(rows.data() + begin, rows.data() + std::min(begin + kChunk, count), state, of,
+                part);
   }
 #pragma omp parallel for schedule(static)
   for (int column = 0; column < unknowns; ++column)
@@ -34,7 +36,8 @@ void NormalSum::add(const std::vector<Row>& rows, const SkinState& state, Normal
     }
 }
 
-void NormalSum::add_chunk(const Row* first, const Row* last, const SkinState& state, Part& part) {
+void NormalSum::add_chunk(const Row* first, const Row* last, const SkinState& state, Unknowns of,
+                          Part& part) {
   const Rig& rig = state.rig;
   const auto mark = [&](int column) { part.place[static_cast<std::size_t>(column)] = 0; };
   for (const Row* row = first; row != last; ++row)
@@ -42,6 +45,7 @@ void NormalSum::add_chunk(const Row* first, const Row* last, const SkinState& st
       if (row->share[c] == 0.0) continue;
       for (const BoneWeight& at : rig.bones_at(row->vertex[c]))
         mark(9 * at.bone);
+      if (of == Unknowns::Bones) continue;
       for (const ShapeOffset& at : rig.shapes_at(row->vertex[c]))
         mark(9 * rig.bones() + at.shape);
     }
@@ -61,9 +65,10 @@ void NormalSum::add_chunk(const Row* first, const Row* last, const SkinState& st
     const double root = std::sqrt(row.weight * loss_weight(residual, row.loss));
     part.residual[i] = root * residual;
     double* const column = part.panel.col(i).data();
-    state.add_point(row.vertex, row.share, root * row.direction, [&](int unknown, double value) {
-      column[part.place[static_cast<std::size_t>(unknown)]] += value;
-    });
+    state.add_point(row.vertex, row.share, root * row.direction, of,
+                    [&](int unknown, double value) {
+                      column[part.place[static_cast<std::size_t>(unknown)]] += value;
+                    });
   }
   part.product.setZero(width, width);
   part.product.selfadjointView<Eigen::Lower>().rankUpdate(part.panel);

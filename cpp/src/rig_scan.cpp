@@ -1,9 +1,11 @@
 #include "rig_scan.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -106,6 +108,57 @@ ScanCloud merged(const Points& points, const Points& normals, const std::vector<
   for (int v = 0; v < count; ++v)
     cloud.border[static_cast<std::size_t>(v)] = 8 * edge[static_cast<std::size_t>(v)] > held[v];
   return cloud;
+}
+
+/// Which points belong to large pieces; points closer than `gap` are of one.
+/// Source: Tarjan (1975), J. ACM 22(2), union by number and path halving.
+std::vector<char> main_pieces(const Points& points, const PointTree& tree, double gap,
+                              double share) {
+  const std::size_t n = static_cast<std::size_t>(points.rows());
+  std::vector<int> parent(n), count(n, 0);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int i) {
+    int* p = &parent[static_cast<std::size_t>(i)];
+    while (*p != i) {
+      *p = parent[static_cast<std::size_t>(*p)];
+      i = *p;
+      p = &parent[static_cast<std::size_t>(i)];
+    }
+    return i;
+  };
+  for (std::size_t i = 0; i < n; ++i)
+    tree.within(points.row(static_cast<Index>(i)).transpose(), gap * gap, [&](int j, double) {
+      const int a = root(static_cast<int>(i)), b = root(j);
+      parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    });
+  for (std::size_t i = 0; i < n; ++i)
+    ++count[static_cast<std::size_t>(root(static_cast<int>(i)))];
+  const double most = *std::max_element(count.begin(), count.end());
+  const double least = std::min(share * static_cast<double>(n), most);
+  std::vector<char> stays(n);
+  for (std::size_t i = 0; i < n; ++i)
+    stays[i] = count[static_cast<std::size_t>(root(static_cast<int>(i)))] >= least;
+  return stays;
+}
+
+/// Only the points that stay. True if any was left out.
+bool keep(const std::vector<char>& stays, ScanCloud& cloud, Eigen::VectorXd& held) {
+  Index to = 0;
+  for (std::size_t i = 0; i < stays.size(); ++i) {
+    if (!stays[i]) continue;
+    const Index from = static_cast<Index>(i);
+    cloud.points.row(to) = cloud.points.row(from);
+    cloud.normals.row(to) = cloud.normals.row(from);
+    held[to] = held[from];
+    if (!cloud.border.empty()) cloud.border[static_cast<std::size_t>(to)] = cloud.border[i];
+    ++to;
+  }
+  if (to == cloud.points.rows()) return false;
+  cloud.points.conservativeResize(to, 3);
+  cloud.normals.conservativeResize(to, 3);
+  held.conservativeResize(to);
+  if (!cloud.border.empty()) cloud.border.resize(static_cast<std::size_t>(to));
+  return true;
 }
 
 /// What the points within `radius` of each say of it.
@@ -238,7 +291,10 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
     cloud.border = border;
   }
   cloud.oriented = given || meshed;
-  const PointTree tree(cloud.points);
+  PointTree tree(cloud.points);
+  if (settings.gap > 0.0 &&
+      keep(main_pieces(cloud.points, tree, settings.gap, settings.share), cloud, held))
+    tree = PointTree(cloud.points);
   Around around = look_around(cloud.points, held, tree, 2.2 * settings.voxel);
   if (settings.thin) uncurve(around, settings.voxel, 2.2 * settings.voxel, cloud.points);
   if (!given) {
