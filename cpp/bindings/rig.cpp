@@ -248,10 +248,10 @@ void bind_rig(py::module_& module) {
            [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
               const supple::RigWeights& weights, const supple::RigPriors& priors,
               const std::vector<supple::RigStage>& stages, const Eigen::VectorXi& triangle,
-              const Points& barycentric, const Points& target, const VectorXd& sd) {
+              const Points& barycentric, const Points& target, const VectorXd& sd, bool matrices) {
              const RigPosture start = posture(R, t, s, b);
              const supple::RigLandmarks landmarks{triangle, barycentric, target, sd};
              return unlocked<RigFitResult>(
-                 [&] { return fit.run(start, weights, priors, stages, landmarks); });
+                 [&] { return fit.run(start, weights, priors, stages, landmarks, matrices); });
            });
 }

@@ -34,13 +34,13 @@ class Run {
         priors_(complete(rig, priors)), marks_(landmark_rows(rig, landmarks, weights.landmark)),
         state_(std::make_unique<SkinState>(rig, start)) {}
 
-  RigFitResult through(const std::vector<RigStage>& stages) {
+  RigFitResult through(const std::vector<RigStage>& stages, bool matrices) {
     for (const RigStage& stage : stages) {
       const double begun = now();
       result_.iterations.push_back(settle(stage));
       result_.stage_seconds.push_back(now() - begun);
     }
-    report(stages.back());
+    report(stages.back(), matrices);
     return std::move(result_);
   }
 
@@ -136,8 +136,8 @@ class Run {
 
   /// Matrices are of the rows that the last iteration used, whose weights stand for all; pairs and
   /// what they say are those of all points.
-  void report(RigStage stage) {
-    report_matrices();
+  void report(RigStage stage, bool matrices) {
+    if (matrices) report_matrices();
     stage.every_point = stage.every_vertex = 1;
     matcher_.match(*state_, stage, weights_, priors_, pairs_);
     need_pairs(stage);
@@ -268,7 +268,7 @@ RigOffset RigFit::offset(const Points& skin, const RigOffsetSettings& settings) 
 
 RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                          const RigPriors& priors, const std::vector<RigStage>& stages,
-                         const RigLandmarks& landmarks) {
+                         const RigLandmarks& landmarks, bool matrices) {
   check_ready(start);
   for (const RigStage& stage : stages)
     if (stage.iterations < 1)
@@ -276,7 +276,7 @@ RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                        std::to_string(stage.iterations) + "; leave the stage out");
   if (stages.empty()) throw ShapeError("stages must be one at least, got none; give a schedule");
   Run run(*state_->rig, state_->matcher, state_->sums, weights, priors, landmarks, start);
-  return run.through(stages);
+  return run.through(stages, matrices);
 }
 
 } // namespace supple

@@ -15,7 +15,7 @@ double energy_of(const std::vector<Row>& rows, const Points& vertices) {
 
 void NormalSum::add(const std::vector<Row>& rows, const SkinState& state, Normal& normal,
                     Unknowns of) {
-  const int unknowns = state.rig.unknowns();
+  const int unknowns = of == Unknowns::All ? state.rig.unknowns() : 9 * state.rig.bones();
   const int count = static_cast<int>(rows.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (int s = 0; s < kSums; ++s) {
@@ -31,7 +31,7 @@ void NormalSum::add(const std::vector<Row>& rows, const SkinState& state, Normal
   for (int column = 0; column < unknowns; ++column)
     for (const Part& part : parts_) {
       const int below = unknowns - column;
-      normal.matrix.col(column).tail(below) += part.matrix.col(column).tail(below);
+      normal.matrix.col(column).segment(column, below) += part.matrix.col(column).tail(below);
       normal.gradient[column] += part.gradient[column];
     }
 }
@@ -50,7 +50,8 @@ void NormalSum::add_chunk(const Row* first, const Row* last, const SkinState& st
         mark(9 * rig.bones() + at.shape);
     }
   part.columns.clear();
-  for (int column = 0; column < rig.unknowns(); ++column) {
+  const int unknowns = static_cast<int>(part.place.size());
+  for (int column = 0; column < unknowns; ++column) {
     const bool of_bone = column < 9 * rig.bones();
     if (part.place[static_cast<std::size_t>(of_bone ? column - column % 9 : column)] < 0) continue;
     part.place[static_cast<std::size_t>(column)] = static_cast<int>(part.columns.size());

@@ -112,8 +112,8 @@ ScanCloud merged(const Points& points, const Points& normals, const std::vector<
 
 /// Which points belong to large pieces; points closer than `gap` are of one.
 /// Source: Tarjan (1975), J. ACM 22(2), union by number and path halving.
-std::vector<char> main_pieces(const Points& points, const PointTree& tree, double gap,
-                              double share) {
+std::vector<char> main_pieces(const Points& points, double gap, double share) {
+  const PointTree tree(points);
   const std::size_t n = static_cast<std::size_t>(points.rows());
   std::vector<int> parent(n), count(n, 0);
   std::iota(parent.begin(), parent.end(), 0);
@@ -139,26 +139,6 @@ std::vector<char> main_pieces(const Points& points, const PointTree& tree, doubl
   for (std::size_t i = 0; i < n; ++i)
     stays[i] = count[static_cast<std::size_t>(root(static_cast<int>(i)))] >= least;
   return stays;
-}
-
-/// Only the points that stay. True if any was left out.
-bool keep(const std::vector<char>& stays, ScanCloud& cloud, Eigen::VectorXd& held) {
-  Index to = 0;
-  for (std::size_t i = 0; i < stays.size(); ++i) {
-    if (!stays[i]) continue;
-    const Index from = static_cast<Index>(i);
-    cloud.points.row(to) = cloud.points.row(from);
-    cloud.normals.row(to) = cloud.normals.row(from);
-    held[to] = held[from];
-    if (!cloud.border.empty()) cloud.border[static_cast<std::size_t>(to)] = cloud.border[i];
-    ++to;
-  }
-  if (to == cloud.points.rows()) return false;
-  cloud.points.conservativeResize(to, 3);
-  cloud.normals.conservativeResize(to, 3);
-  held.conservativeResize(to);
-  if (!cloud.border.empty()) cloud.border.resize(static_cast<std::size_t>(to));
-  return true;
 }
 
 /// What the points within `radius` of each say of it.
@@ -259,6 +239,22 @@ void check(const Points& points, const Triangles& triangles, const Points& norma
         std::to_string(size) + "; take 0.01");
 }
 
+/// Its large pieces alone, looked at again without the others.
+ScanCloud without_clutter(const ScanCloud& whole, const ScanSettings& settings) {
+  const std::vector<char> stays = main_pieces(whole.points, settings.gap, settings.share);
+  const Index count = std::count(stays.begin(), stays.end(), char{1});
+  if (count == whole.points.rows()) return whole;
+  Points points(count, 3), normals(count, 3);
+  Index to = 0;
+  for (std::size_t i = 0; i < stays.size(); ++i) {
+    if (!stays[i]) continue;
+    points.row(to) = whole.points.row(static_cast<Index>(i));
+    normals.row(to++) = whole.normals.row(static_cast<Index>(i));
+  }
+  ScanSettings again{settings.voxel, false};
+  return prepared(points, Triangles(0, 3), whole.oriented ? normals : Points(0, 3), again);
+}
+
 } // namespace
 
 ScanCloud prepared(const Points& points, const Triangles& triangles, const Points& normals,
@@ -291,10 +287,7 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
     cloud.border = border;
   }
   cloud.oriented = given || meshed;
-  PointTree tree(cloud.points);
-  if (settings.gap > 0.0 &&
-      keep(main_pieces(cloud.points, tree, settings.gap, settings.share), cloud, held))
-    tree = PointTree(cloud.points);
+  const PointTree tree(cloud.points);
   Around around = look_around(cloud.points, held, tree, 2.2 * settings.voxel);
   if (settings.thin) uncurve(around, settings.voxel, 2.2 * settings.voxel, cloud.points);
   if (!given) {
@@ -304,7 +297,8 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
   if (!meshed) cloud.border.swap(around.border);
   unit_normals(cloud.normals);
   cloud.area = around.share;
-  return ordered(cloud, tree.order());
+  const ScanCloud whole = ordered(cloud, tree.order());
+  return settings.gap > 0.0 ? without_clutter(whole, settings) : whole;
 }
 
 } // namespace supple

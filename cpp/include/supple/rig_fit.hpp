@@ -161,9 +161,11 @@ class RigFit {
   RigOffset offset(const Points& skin, const RigOffsetSettings& settings);
 
   /// From `start` through all stages. Bitwise the same for any number of threads.
+  /// `matrices`: the result's two are filled; a fit that only leads to the next needs none.
   /// @throws StateError without a scan; ShapeError; NumericalError when no pair is within reach.
   RigFitResult run(const RigPosture& start, const RigWeights& weights, const RigPriors& priors,
-                   const std::vector<RigStage>& stages, const RigLandmarks& landmarks);
+                   const std::vector<RigStage>& stages, const RigLandmarks& landmarks,
+                   bool matrices = true);
 
   /// One evaluation with the pairs of `pairs_at`.
   RigEvaluation evaluate(const RigPosture& pairs_at, const RigPosture& at,

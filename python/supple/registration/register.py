@@ -151,7 +151,7 @@ def _starts(
 
 def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str, Floats],
          keep: RegisterSettings) -> RigFit:  # fmt: skip
-    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd)
+    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd, False)
 
 
 def _fine(
@@ -165,7 +165,7 @@ def _fine(
     priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
-        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds)
+        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
         first, stages = fit.posture, stages[-1:]
         if fit.patch_sd > keep.follows:
             priors = loose

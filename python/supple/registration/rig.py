@@ -162,12 +162,14 @@ class Rig:
         priors: Priors | None = None,
         landmarks: Mapping[str, npt.ArrayLike] | None = None,
         landmark_sd: float | Mapping[str, float] = 5e-3,
+        matrices: bool = True,
     ) -> RigFit:
         """Fit to the scan from ``start``; other threads may run meanwhile.
 
         Args:
             landmarks: name → (3,) m on the scan.
             landmark_sd: m, of all or of each.
+            matrices: False: those of the result stay empty (0, 0), which saves a tenth.
 
         Raises:
             InputError: no scan, a landmark that the template does not name.
@@ -178,7 +180,7 @@ class Rig:
             found = self._fit.run(
                 *_arrays(start), weights_in_core(weights or Weights()),
                 priors_in_core(chosen, self.template), [stage_in_core(stage) for stage in stages],
-                *self._landmarks(named, landmark_sd),
+                *self._landmarks(named, landmark_sd), matrices,
             )  # fmt: skip
         except core().Error as error:
             kind = ConvergenceError if "pairs" in str(error) else InputError
