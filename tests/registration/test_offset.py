@@ -12,7 +12,7 @@ from supple.surface import Surface
 
 
 def test_its_precision_far_from_the_scan_is_the_fields() -> None:
-    """Where no scan point lands, the core's matrix is Lindgren et al.'s, made with sparse products."""
+    """Where no scan point lands, the core's matrix is Lindgren et al.'s."""
     from scipy.sparse import csc_array
 
     template, rig = torso(), Rig(torso())
