@@ -3,6 +3,7 @@
 #include "core.hpp"
 #include "supple/error.hpp"
 #include "supple/rig_fit.hpp"
+#include "supple/rig_uncertainty.hpp"
 
 namespace {
 
@@ -114,6 +115,21 @@ void bind_result(py::module_& module) {
                                return border;
                              })
       .def_readonly("oriented", &ScanCloud::oriented);
+  using supple::RigOffset, supple::RigOffsetSettings;
+  py::class_<RigOffsetSettings>(module, "RigOffsetSettings")
+      .def(py::init<>())
+      .def_readwrite("prior", &RigOffsetSettings::prior)
+      .def_readwrite("length", &RigOffsetSettings::length)
+      .def_readwrite("per_area", &RigOffsetSettings::per_area)
+      .def_readwrite("reach", &RigOffsetSettings::reach)
+      .def_readwrite("aside", &RigOffsetSettings::aside)
+      .def_readwrite("rounds", &RigOffsetSettings::rounds);
+  py::class_<RigOffset>(module, "RigOffset")
+      .def_readonly("height", &RigOffset::height)
+      .def_readonly("along", &RigOffset::along)
+      .def_readonly("start", &RigOffset::start)
+      .def_readonly("row", &RigOffset::row)
+      .def_readonly("values", &RigOffset::values);
   using supple::RigEvaluation;
   py::class_<RigEvaluation>(module, "RigEvaluation")
       .def_readonly("terms", &RigEvaluation::terms)
@@ -146,6 +162,16 @@ void bind_result(py::module_& module) {
       .def_readonly("vertex_used", &RigFitResult::vertex_used);
 }
 
+void bind_uncertainty(py::module_& module) {
+  using supple::ResidualRings;
+  py::class_<ResidualRings>(module, "ResidualRings")
+      .def_readonly("count", &ResidualRings::count)
+      .def_readonly("sum", &ResidualRings::sum);
+  module.def("residual_rings", &supple::residual_rings, Unlocked());
+  module.def("inverse_sum", &supple::inverse_sum, Unlocked());
+  module.def("inflated", &supple::inflated, Unlocked());
+}
+
 void bind_rig_itself(py::module_& module) {
   py::class_<Rig, std::shared_ptr<Rig>>(module, "Rig")
       .def(py::init([](const Points& points, const supple::Triangles& triangles,
@@ -166,11 +192,12 @@ void bind_rig_itself(py::module_& module) {
              const RigPosture at = posture(R, t, s, b);
              return unlocked<RowMatrix>([&] { return rig.jacobian(at); });
            })
-      .def("vertex_sd", [](const Rig& rig, const Array& R, const Points& t, const Points& s,
-                           const VectorXd& b, const Eigen::MatrixXd& covariance) {
-        const RigPosture at = posture(R, t, s, b);
-        return unlocked<VectorXd>([&] { return rig.vertex_sd(at, covariance); });
-      });
+      .def("vertex_sd",
+           [](const Rig& rig, const Array& R, const Points& t, const Points& s, const VectorXd& b,
+              const Eigen::MatrixXd& covariance, const Eigen::VectorXi& of) {
+             const RigPosture at = posture(R, t, s, b);
+             return unlocked<VectorXd>([&] { return rig.vertex_sd(at, covariance, of); });
+           });
 }
 
 } // namespace
@@ -179,13 +206,17 @@ void bind_rig(py::module_& module) {
   bind_settings(module);
   bind_result(module);
   bind_rig_itself(module);
+  bind_uncertainty(module);
   py::class_<RigFit>(module, "RigFit")
       .def(py::init([](std::shared_ptr<Rig> rig) { return std::make_unique<RigFit>(rig); }))
       .def(
           "set_scan",
           [](RigFit& fit, const Points& points, const supple::Triangles& triangles,
-             const Points& normals, double voxel,
-             bool thin) { fit.set_scan(points, triangles, normals, {voxel, thin}); },
+             const Points& normals, double voxel, bool thin, double gap) {
+            supple::ScanSettings settings{voxel, thin};
+            settings.gap = gap;
+            fit.set_scan(points, triangles, normals, settings);
+          },
           Unlocked())
       .def_property_readonly("scan", &RigFit::scan, py::return_value_policy::copy)
       .def("evaluate",
@@ -209,14 +240,18 @@ void bind_rig(py::module_& module) {
              const auto landed = unlocked<supple::RigLanding>([&] { return fit.land(at, points); });
              return py::make_tuple(landed.triangle, landed.barycentric, landed.distance);
            })
+      .def("offset",
+           [](RigFit& fit, const Points& skin, const supple::RigOffsetSettings& settings) {
+             return unlocked<supple::RigOffset>([&] { return fit.offset(skin, settings); });
+           })
       .def("run",
            [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
               const supple::RigWeights& weights, const supple::RigPriors& priors,
               const std::vector<supple::RigStage>& stages, const Eigen::VectorXi& triangle,
-              const Points& barycentric, const Points& target, const VectorXd& sd) {
+              const Points& barycentric, const Points& target, const VectorXd& sd, bool matrices) {
              const RigPosture start = posture(R, t, s, b);
              const supple::RigLandmarks landmarks{triangle, barycentric, target, sd};
              return unlocked<RigFitResult>(
-                 [&] { return fit.run(start, weights, priors, stages, landmarks); });
+                 [&] { return fit.run(start, weights, priors, stages, landmarks, matrices); });
            });
 }

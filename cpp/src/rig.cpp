@@ -108,14 +108,18 @@ RowMatrix Rig::jacobian(const RigPosture& posture) const {
   return J;
 }
 
-Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture, const Eigen::MatrixXd& covariance) const {
+Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture, const Eigen::MatrixXd& covariance,
+                               const Eigen::VectorXi& of) const {
   check(posture);
   require_size("covariance's rows", covariance.rows(), unknowns(), "one row an unknown");
   require_size("covariance's columns", covariance.cols(), unknowns(), "one column an unknown");
   const SkinState state(*this, posture);
-  Eigen::VectorXd sd(vertices());
+  if (of.size() > 0 && (of.minCoeff() < 0 || of.maxCoeff() >= vertices()))
+    throw ShapeError("of must name vertices of the template; renumber them");
+  Eigen::VectorXd sd(of.size());
 #pragma omp parallel for schedule(static)
-  for (int i = 0; i < vertices(); ++i) {
+  for (Eigen::Index k = 0; k < of.size(); ++k) {
+    const int i = of[k];
     std::vector<int> columns;
     std::vector<double> values;
     double trace = 0.0;
@@ -133,7 +137,7 @@ Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture, const Eigen::MatrixXd&
         trace += sum * values[a];
       }
     }
-    sd[i] = std::sqrt(std::max(trace, 0.0) / 3.0);
+    sd[k] = std::sqrt(std::max(trace, 0.0) / 3.0);
   }
   return sd;
 }

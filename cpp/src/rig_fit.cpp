@@ -9,6 +9,7 @@
 #include "rig_energy.hpp"
 #include "rig_match.hpp"
 #include "rig_moves.hpp"
+#include "rig_offset.hpp"
 #include "rig_scan.hpp"
 #include "rig_spread.hpp"
 #include "supple/error.hpp"
@@ -33,13 +34,13 @@ class Run {
         priors_(complete(rig, priors)), marks_(landmark_rows(rig, landmarks, weights.landmark)),
         state_(std::make_unique<SkinState>(rig, start)) {}
 
-  RigFitResult through(const std::vector<RigStage>& stages) {
+  RigFitResult through(const std::vector<RigStage>& stages, bool matrices) {
     for (const RigStage& stage : stages) {
       const double begun = now();
       result_.iterations.push_back(settle(stage));
       result_.stage_seconds.push_back(now() - begun);
     }
-    report(stages.back());
+    report(stages.back(), matrices);
     return std::move(result_);
   }
 
@@ -77,7 +78,7 @@ class Run {
       need_pairs(stage);
       const double energy = energy_at(*state_);
       result_.history.push_back(energy);
-      assemble();
+      assemble(stage.moves == Moves::All ? Unknowns::All : Unknowns::Bones);
       if (!improve(stage.moves, energy, damping)) return i + 1;
       const bool flat = std::abs(before - energy) < stage.flat * energy;
       before = energy;
@@ -101,12 +102,12 @@ class Run {
            prior_terms(rig_, state.posture, weights_, priors_).total();
   }
 
-  void assemble() {
+  void assemble(Unknowns of = Unknowns::All) {
     const Index n = rig_.unknowns();
     normal_.matrix.setZero(n, n);
     normal_.gradient.setZero(n);
-    sums_.add(pairs_.rows, *state_, normal_);
-    if (!marks_.empty()) sums_.add(marks_, *state_, normal_);
+    sums_.add(pairs_.rows, *state_, normal_, of);
+    if (!marks_.empty()) sums_.add(marks_, *state_, normal_, of);
     add_priors(rig_, state_->posture, weights_, priors_, normal_);
   }
 
@@ -135,8 +136,8 @@ class Run {
 
   /// Matrices are of the rows that the last iteration used, whose weights stand for all; pairs and
   /// what they say are those of all points.
-  void report(RigStage stage) {
-    report_matrices();
+  void report(RigStage stage, bool matrices) {
+    if (matrices) report_matrices();
     stage.every_point = stage.every_vertex = 1;
     matcher_.match(*state_, stage, weights_, priors_, pairs_);
     need_pairs(stage);
@@ -208,6 +209,7 @@ struct RigFit::State {
   Matcher matcher;
   NormalSum sums;
   ScanCloud scan;
+  std::unique_ptr<OffsetSolver> offsets;
 
   explicit State(std::shared_ptr<const Rig> of) : rig(std::move(of)), matcher(*rig) {}
 };
@@ -245,9 +247,9 @@ RigLanding RigFit::land(const RigPosture& posture, const Points& points) {
   if (!points.allFinite())
     throw NumericalError("points must be finite, got NaN or infinity; look at the points given");
   const std::vector<Landing> landed = state_->matcher.land(state_->rig->posed(posture), points);
-  const Index n = points.rows();
+  const Eigen::Index n = points.rows();
   RigLanding result{Eigen::VectorXi(n), Points(n, 3), Eigen::VectorXd(n)};
-  for (Index i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < n; ++i) {
     const Landing& at = landed[static_cast<std::size_t>(i)];
     result.triangle[i] = at.triangle;
     result.barycentric.row(i) = at.barycentric.transpose();
@@ -256,9 +258,17 @@ RigLanding RigFit::land(const RigPosture& posture, const Points& points) {
   return result;
 }
 
+RigOffset RigFit::offset(const Points& skin, const RigOffsetSettings& settings) {
+  if (state_->scan.points.rows() == 0)
+    throw StateError("an offset must have a scan; call set_scan first");
+  require_size("skin", skin.rows(), state_->rig->vertices(), "give the template's vertices");
+  if (!state_->offsets) state_->offsets = std::make_unique<OffsetSolver>(*state_->rig);
+  return state_->offsets->solve(skin, state_->scan, state_->matcher, settings);
+}
+
 RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                          const RigPriors& priors, const std::vector<RigStage>& stages,
-                         const RigLandmarks& landmarks) {
+                         const RigLandmarks& landmarks, bool matrices) {
   check_ready(start);
   for (const RigStage& stage : stages)
     if (stage.iterations < 1)
@@ -266,7 +276,7 @@ RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                        std::to_string(stage.iterations) + "; leave the stage out");
   if (stages.empty()) throw ShapeError("stages must be one at least, got none; give a schedule");
   Run run(*state_->rig, state_->matcher, state_->sums, weights, priors, landmarks, start);
-  return run.through(stages);
+  return run.through(stages, matrices);
 }
 
 } // namespace supple

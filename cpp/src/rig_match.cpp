@@ -81,6 +81,18 @@ std::vector<Landing> Matcher::land(const Points& vertices, const Points& points)
   return landed;
 }
 
+std::vector<Landing> Matcher::land_scan(const Points& vertices, double reach) {
+  skin_.refit(vertices);
+  std::vector<Landing> landed(hint_.size());
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < landed.size(); ++i) {
+    landed[i] =
+        skin_.closest(scan_->points.row(static_cast<Index>(i)).transpose(), reach, hint_[i]);
+    if (landed[i].leaf >= 0) hint_[i] = landed[i].leaf;
+  }
+  return landed;
+}
+
 void Matcher::from_scan(const RigStage& stage, double weight, Pairs& pairs) {
   const Index all = scan_->points.rows(), every = std::max(1, stage.every_point);
   pairs.triangle.setConstant(all, -1);

@@ -27,6 +27,9 @@ class Matcher {
   /// Each of `points` (m, 3) on the skin at `vertices`, however far.
   std::vector<Landing> land(const Points& vertices, const Points& points);
 
+  /// Each of the scan's points on the skin at `vertices`, within `reach` m.
+  std::vector<Landing> land_scan(const Points& vertices, double reach);
+
   /// Rows' weights are areas/(patch² noise²) × the data's weight, so that a patch counts as one
   /// observation, however many points it holds.
   void match(const SkinState& state, const RigStage& stage, const RigWeights& weights,

@@ -54,8 +54,10 @@ struct Normal {
 /// fixed number of sums, added in a fixed order, so that the threads' number leaves no trace.
 class NormalSum {
  public:
-  /// Rows in the order given; neighbours should be near each other on the skin.
-  void add(const std::vector<Row>& rows, const SkinState& state, Normal& normal);
+  /// Rows in the order given; neighbours should be near each other on the skin. What only bones
+  /// move for, without the shapes' part.
+  void add(const std::vector<Row>& rows, const SkinState& state, Normal& normal,
+           Unknowns of = Unknowns::All);
 
  private:
   static constexpr int kSums = 4, kChunk = 192;
@@ -64,7 +66,8 @@ class NormalSum {
     Eigen::VectorXd gradient, residual, step;
     std::vector<int> place, columns; ///< of each unknown in the panel; −1 if not there
   };
-  static void add_chunk(const Row* first, const Row* last, const SkinState& state, Part& part);
+  static void add_chunk(const Row* first, const Row* last, const SkinState& state, Unknowns of,
+                        Part& part);
   std::array<Part, kSums> parts_;
 };
 

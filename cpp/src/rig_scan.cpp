@@ -1,9 +1,11 @@
 #include "rig_scan.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -108,6 +110,37 @@ ScanCloud merged(const Points& points, const Points& normals, const std::vector<
   return cloud;
 }
 
+/// Which points belong to large pieces; points closer than `gap` are of one.
+/// Source: Tarjan (1975), J. ACM 22(2), union by number and path halving.
+std::vector<char> main_pieces(const Points& points, double gap, double share) {
+  const PointTree tree(points);
+  const std::size_t n = static_cast<std::size_t>(points.rows());
+  std::vector<int> parent(n), count(n, 0);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int i) {
+    int* p = &parent[static_cast<std::size_t>(i)];
+    while (*p != i) {
+      *p = parent[static_cast<std::size_t>(*p)];
+      i = *p;
+      p = &parent[static_cast<std::size_t>(i)];
+    }
+    return i;
+  };
+  for (std::size_t i = 0; i < n; ++i)
+    tree.within(points.row(static_cast<Index>(i)).transpose(), gap * gap, [&](int j, double) {
+      const int a = root(static_cast<int>(i)), b = root(j);
+      parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    });
+  for (std::size_t i = 0; i < n; ++i)
+    ++count[static_cast<std::size_t>(root(static_cast<int>(i)))];
+  const double most = *std::max_element(count.begin(), count.end());
+  const double least = std::min(share * static_cast<double>(n), most);
+  std::vector<char> stays(n);
+  for (std::size_t i = 0; i < n; ++i)
+    stays[i] = count[static_cast<std::size_t>(root(static_cast<int>(i)))] >= least;
+  return stays;
+}
+
 /// What the points within `radius` of each say of it.
 struct Around {
   Points normal;         ///< along their least spread; 0 of fewer than four
@@ -206,6 +239,22 @@ void check(const Points& points, const Triangles& triangles, const Points& norma
         std::to_string(size) + "; take 0.01");
 }
 
+/// Its large pieces alone, looked at again without the others.
+ScanCloud without_clutter(const ScanCloud& whole, const ScanSettings& settings) {
+  const std::vector<char> stays = main_pieces(whole.points, settings.gap, settings.share);
+  const Index count = std::count(stays.begin(), stays.end(), char{1});
+  if (count == whole.points.rows()) return whole;
+  Points points(count, 3), normals(count, 3);
+  Index to = 0;
+  for (std::size_t i = 0; i < stays.size(); ++i) {
+    if (!stays[i]) continue;
+    points.row(to) = whole.points.row(static_cast<Index>(i));
+    normals.row(to++) = whole.normals.row(static_cast<Index>(i));
+  }
+  ScanSettings again{settings.voxel, false};
+  return prepared(points, Triangles(0, 3), whole.oriented ? normals : Points(0, 3), again);
+}
+
 } // namespace
 
 ScanCloud prepared(const Points& points, const Triangles& triangles, const Points& normals,
@@ -248,7 +297,8 @@ ScanCloud prepared(const Points& points, const Triangles& triangles, const Point
   if (!meshed) cloud.border.swap(around.border);
   unit_normals(cloud.normals);
   cloud.area = around.share;
-  return ordered(cloud, tree.order());
+  const ScanCloud whole = ordered(cloud, tree.order());
+  return settings.gap > 0.0 ? without_clutter(whole, settings) : whole;
 }
 
 } // namespace supple

@@ -79,6 +79,9 @@ struct LinearBones {
   }
 };
 
+/// Which unknowns derivatives are taken by.
+enum class Unknowns { Bones, All };
+
 /// A posed skin and what its derivatives need.
 struct SkinState {
   using Vec3 = Eigen::Vector3d;
@@ -107,10 +110,10 @@ struct SkinState {
   /// columns are linear in Σ share w and Σ share w x.
   template <class Add>
   void add_point(const std::array<int, 3>& vertex, const std::array<double, 3>& share,
-                 const Vec3& d, const Add& add) const {
+                 const Vec3& d, Unknowns of, const Add& add) const {
     if (dual) {
       for (std::size_t c = 0; c < 3; ++c)
-        if (share[c] != 0.0) add_row(vertex[c], share[c] * d, add);
+        if (share[c] != 0.0) add_row(vertex[c], share[c] * d, add, of);
       return;
     }
     Sums sums;
@@ -119,18 +122,18 @@ struct SkinState {
         add_linear(vertex[c], share[c] * d, add);
     for (std::size_t b = 0; b < sums.count; ++b)
       add_sum(sums.bone[b], sums.weight[b], sums.arm[b], d, add);
-    for (std::size_t c = 0; c < 3; ++c)
+    for (std::size_t c = 0; c < 3 && of == Unknowns::All; ++c)
       if (share[c] != 0.0) add_shapes(vertex[c], share[c] * d, add);
   }
 
   /// add(column, ∂(d·v_i)/∂unknown) for every unknown that moves vertex i.
   template <class Add>
-  void add_row(int i, const Vec3& d, const Add& add) const {
+  void add_row(int i, const Vec3& d, const Add& add, Unknowns of = Unknowns::All) const {
     if (dual)
       add_dual(i, d, add);
     else
       add_linear(i, d, add);
-    add_shapes(i, d, add);
+    if (of == Unknowns::All) add_shapes(i, d, add);
   }
 
  private:

@@ -13,7 +13,8 @@ from supple.registration.offset import matern
 from supple.registration.pose_presets import PRESETS, preset_posture, vertex_normals
 from supple.registration.posture import posed
 from supple.registration.procedural import torso
-from supple.registration.scan_pieces import main_pieces
+from supple.registration.rig import Rig
+from supple.surface import Surface
 
 
 def _angle(R: np.ndarray) -> np.ndarray:
@@ -85,7 +86,11 @@ def test_small_pieces_are_left_out() -> None:
     lattice = np.stack(np.meshgrid(*[np.arange(10) * 0.01] * 2, [0.0]), -1).reshape(-1, 3)
     beside = lattice + np.array([0.2, 0.0, 0.0])
     points = np.vstack([lattice, beside, [[1.0, 1.0, 1.0]]])
-    assert main_pieces(points, 0.012).tolist() == [True] * 200 + [False]
+    rig = Rig(torso())
+    rig.set_scan(Surface(points), thin=False, gap=0.012)
+    kept = np.asarray(rig.cloud.points)
+    assert len(kept) == 200
+    assert np.abs(kept[:, 0]).max() < 0.5
 
 
 def test_the_smooth_field_has_its_standard_deviation() -> None:

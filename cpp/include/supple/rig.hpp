@@ -90,9 +90,10 @@ class Rig {
   Points posed(const RigPosture& posture) const;
   /// (3n, 9K + A): rows x, y, z of each vertex. Dense, for tests; a fit never forms it.
   RowMatrix jacobian(const RigPosture& posture) const;
-  /// (n) sd of each vertex, √ of the trace of its covariance / 3, for the covariance of the
-  /// unknowns `covariance` (9K + A, 9K + A).
-  Eigen::VectorXd vertex_sd(const RigPosture& posture, const Eigen::MatrixXd& covariance) const;
+  /// (v) sd of each of the vertices `of` (v), √ of the trace of its covariance / 3, for the
+  /// covariance of the unknowns `covariance` (9K + A, 9K + A).
+  Eigen::VectorXd vertex_sd(const RigPosture& posture, const Eigen::MatrixXd& covariance,
+                            const Eigen::VectorXi& of) const;
 
  private:
   template <class T>

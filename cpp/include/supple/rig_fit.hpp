@@ -66,6 +66,8 @@ struct RigLandmarks {
 struct ScanSettings {
   double voxel = 12e-3; ///< m: points within a voxel become one, their mean
   bool thin = true;     ///< false: every point is used as it is
+  double gap = 0.0;     ///< m: thinned points closer than this are of one piece; 0: no pieces
+  double share = 0.04;  ///< of the points that a piece must have to stay; the largest does always
 };
 
 /// The scan as it is used, in an order of its own.
@@ -120,6 +122,24 @@ struct RigLanding {
   Eigen::VectorXd distance; ///< (m) m
 };
 
+/// Lengths in m.
+struct RigOffsetSettings {
+  double prior = 1e-3;   ///< standard deviation of the displacement
+  double length = 0.08;  ///< over which it is correlated
+  double per_area = 1.0; ///< 1/m⁴: weight of a scan point for each m² of the skin
+  double reach = 25e-3;  ///< partners further away are none
+  double aside = 3e-3;   ///< nor are those that lie beside the skin by more
+  int rounds = 3;        ///< of new partners
+};
+
+/// A displacement of the skin along its normals.
+struct RigOffset {
+  Eigen::VectorXd height;     ///< (n) m
+  Points along;               ///< (n, 3) unit normals
+  Eigen::VectorXi start, row; ///< (n + 1), (nonzeros): its precision by columns, rows ascending
+  Eigen::VectorXd values;     ///< (nonzeros) 1/m²
+};
+
 /// Fits a rig; keeps the scan and its trees. Not to be used by two threads at once.
 class RigFit {
  public:
@@ -136,10 +156,16 @@ class RigFit {
   /// Where `points` (m, 3) m land on the skin of a posture, however far.
   RigLanding land(const RigPosture& posture, const Points& points);
 
+  /// What the scan is off `skin` (n, 3) m, smoothly. Bitwise the same for any number of threads.
+  /// @throws StateError without a scan; ShapeError.
+  RigOffset offset(const Points& skin, const RigOffsetSettings& settings);
+
   /// From `start` through all stages. Bitwise the same for any number of threads.
+  /// `matrices`: the result's two are filled; a fit that only leads to the next needs none.
   /// @throws StateError without a scan; ShapeError; NumericalError when no pair is within reach.
   RigFitResult run(const RigPosture& start, const RigWeights& weights, const RigPriors& priors,
-                   const std::vector<RigStage>& stages, const RigLandmarks& landmarks);
+                   const std::vector<RigStage>& stages, const RigLandmarks& landmarks,
+                   bool matrices = true);
 
   /// One evaluation with the pairs of `pairs_at`.
   RigEvaluation evaluate(const RigPosture& pairs_at, const RigPosture& at,

@@ -14,10 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from supple.registration.pose_presets import vertex_normals
-from supple.registration.rig import RigFit
+from supple.registration.rig import Rig, RigFit
 from supple.registration.template import Floats, Ints
-from supple.surface import Surface
 
 
 @dataclass(frozen=True)
@@ -43,54 +41,21 @@ class Offset:
     prior: float
 
 
-def offset(
-    fit: RigFit, triangles: Ints, points: Floats, normals: Floats, oriented: bool,
-    settings: OffsetSettings,
-) -> Offset:  # fmt: skip
-    """The displacement that brings the fitted skin to the scan's points (c, 3) m."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
+def offset(rig: Rig, fit: RigFit, settings: OffsetSettings) -> Offset:
+    """The displacement that brings the fitted skin to the scan that ``rig`` holds."""
     prior = float(np.clip(fit.patch_sd, settings.least, settings.most))
-    skin = fit.points
-    along = vertex_normals(skin, triangles)
-    Q = matern(skin, triangles, prior, settings.length)
-    h = np.zeros(len(skin))
-    precision = Q
-    area = Surface(skin, triangles).areas.sum() * (fit.vertex_used > 0).mean()
-    one = area / max((fit.used > 0.1).sum(), 1) / (settings.patch * settings.noise) ** 2
-    for k in range(settings.rounds):
-        B, r, w = _rows(skin, along, h, triangles, points, normals, oriented, settings, prior)
-        weighted = B.T.multiply(one * w).tocsr()
-        precision = csc_array(Q + weighted @ B)
-        h = splu(precision, permc_spec="MMD_AT_PLUS_A",
-                 options={"SymmetricMode": True}).solve(weighted @ r)  # fmt: skip
-        del k
-    return Offset(h[:, None] * along, precision, prior)
+    seen = float((fit.vertex_used > 0).mean()) / max(int((fit.used > 0.1).sum()), 1)
+    found = rig.offset(fit.points, prior=prior, length=settings.length,
+                       per_area=seen / (settings.patch * settings.noise) ** 2,
+                       reach=settings.reach, rounds=settings.rounds)  # fmt: skip
+    return Offset(found.height[:, None] * found.along, _sparse(found), prior)
 
 
-def _rows(skin: Floats, along: Floats, h: Floats, triangles: Ints, points: Floats,
-          normals: Floats, oriented: bool, settings: OffsetSettings,
-          prior: float) -> tuple[Any, Floats, Floats]:  # fmt: skip
-    """Of each scan point with a partner: its row of B (c, n), where it wants h, its weight."""
-    from scipy.sparse import csr_array
+def _sparse(found: Any) -> Any:
+    from scipy.sparse import csc_array
 
-    at = skin + h[:, None] * along
-    hit = Surface(at, triangles).closest(points)
-    corners, share = triangles[hit.triangle], np.asarray(hit.barycentric)
-    normal = np.einsum("kc,kcd->kd", share, along[corners])
-    signed = np.einsum("kd,kd->k", normal, points - np.asarray(hit.point))
-    cosine = np.einsum("kd,kd->k", normal, normals)
-    known = (normals != 0).any(axis=1)
-    cosine = np.where(known, cosine if oriented else np.abs(cosine), 1.0)
-    aside = np.sqrt(np.maximum(np.asarray(hit.distance) ** 2 - signed**2, 0))
-    good = (np.asarray(hit.distance) < settings.reach) & (cosine > 0.5) & (aside < 3e-3)
-    loss = max(4 * prior, 4e-3)
-    weight = good / (1 + (signed / loss) ** 2) ** 2
-    keep = np.flatnonzero(weight > 1e-3)
-    rows = np.repeat(np.arange(len(keep)), 3)
-    B = csr_array((share[keep].ravel(), (rows, corners[keep].ravel())), (len(keep), len(skin)))
-    return B, B @ h + signed[keep], weight[keep]
+    n = len(found.height)
+    return csc_array((found.values, found.row, found.start), (n, n))
 
 
 def matern(points: Floats, triangles: Ints, sd: float, length: float) -> Any:

@@ -30,7 +30,6 @@ from supple.registration.posture import Posture
 from supple.registration.register_settings import RegisterSettings
 from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
-from supple.registration.scan_pieces import main_pieces
 from supple.registration.template import Floats, Template
 from supple.registration.trust import doubts
 from supple.surface import Surface
@@ -134,13 +133,7 @@ def _check(scan: Surface) -> None:
 
 def _set_scan(rig: Rig, scan: Surface, keep: RegisterSettings) -> None:
     """Thinned, and without the small pieces beside the body."""
-    rig.set_scan(scan, voxel=keep.voxel)
-    cloud = rig.cloud
-    points, normals = np.asarray(cloud.points), np.asarray(cloud.normals)
-    body = main_pieces(points, 1.9 * keep.voxel)
-    if not body.all():
-        given = normals[body] if cloud.oriented else None
-        rig.set_scan(Surface(points[body]), given, thin=False)
+    rig.set_scan(scan, voxel=keep.voxel, gap=1.9 * keep.voxel)
 
 
 def _starts(
@@ -158,7 +151,7 @@ def _starts(
 
 def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str, Floats],
          keep: RegisterSettings) -> RigFit:  # fmt: skip
-    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd)
+    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd, False)
 
 
 def _fine(
@@ -172,7 +165,7 @@ def _fine(
     priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
-        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds)
+        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
         first, stages = fit.posture, stages[-1:]
         if fit.patch_sd > keep.follows:
             priors = loose
@@ -195,10 +188,7 @@ def coarse_score(fit: RigFit, reach: float) -> float:
 def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
     if keep.offset is None:
         return Offset(np.zeros_like(fit.points), None, 0.0)
-    cloud = rig.cloud
-    return offset(
-        fit, rig.template.triangles, fit.scan_points, fit.scan_normals, cloud.oriented, keep.offset
-    )
+    return offset(rig, fit, keep.offset)
 
 
 def _result(

@@ -113,9 +113,19 @@ class Rig:
         """(3n, 9K+A) of the vertices by the steps of `Posture.stepped`."""
         return np.asarray(self._rig.jacobian(*_arrays(posture)))
 
-    def vertex_sd(self, posture: Posture, covariance: Floats) -> Floats:
-        """(n,) m: √(trace of a vertex' covariance / 3), for that of the unknowns."""
-        return np.asarray(self._rig.vertex_sd(*_arrays(posture), covariance))
+    def vertex_sd(
+        self, posture: Posture, covariance: Floats, of: npt.NDArray[np.bool_] | None = None
+    ) -> Floats:
+        """(n,) m: √(trace of a vertex' covariance / 3), for that of the unknowns; or only ``of``.
+
+        Args:
+            of: (n,) which vertices; all by default.
+        """
+        count = len(self.template.points)
+        asked = np.arange(count) if of is None else np.flatnonzero(of)
+        return np.asarray(
+            self._rig.vertex_sd(*_arrays(posture), covariance, asked.astype(np.int32))
+        )
 
     def set_scan(
         self,
@@ -123,6 +133,7 @@ class Rig:
         normals: npt.ArrayLike | None = None,
         voxel: float = 12e-3,
         thin: bool = True,
+        gap: float = 0.0,
     ) -> None:
         """The scan of the fits to come.
 
@@ -132,9 +143,11 @@ class Rig:
                 from the points around, and their sign stays open.
             voxel: m; the points of a voxel become their mean.
             thin: False: every point is used as it is.
+            gap: m; thinned points closer than this are of one piece, and pieces with less than
+                4 % of them are left out; 0: all stay.
         """
         given = np.empty((0, 3)) if normals is None else np.asarray(normals, dtype=np.float64)
-        self._fit.set_scan(scan.points, scan.triangles.astype(np.int32), given, voxel, thin)
+        self._fit.set_scan(scan.points, scan.triangles.astype(np.int32), given, voxel, thin, gap)
 
     @property
     def cloud(self) -> Any:
@@ -149,12 +162,14 @@ class Rig:
         priors: Priors | None = None,
         landmarks: Mapping[str, npt.ArrayLike] | None = None,
         landmark_sd: float | Mapping[str, float] = 5e-3,
+        matrices: bool = True,
     ) -> RigFit:
         """Fit to the scan from ``start``; other threads may run meanwhile.
 
         Args:
             landmarks: name → (3,) m on the scan.
             landmark_sd: m, of all or of each.
+            matrices: False: those of the result stay empty (0, 0), which saves a tenth.
 
         Raises:
             InputError: no scan, a landmark that the template does not name.
@@ -165,7 +180,7 @@ class Rig:
             found = self._fit.run(
                 *_arrays(start), weights_in_core(weights or Weights()),
                 priors_in_core(chosen, self.template), [stage_in_core(stage) for stage in stages],
-                *self._landmarks(named, landmark_sd),
+                *self._landmarks(named, landmark_sd), matrices,
             )  # fmt: skip
         except core().Error as error:
             kind = ConvergenceError if "pairs" in str(error) else InputError
@@ -177,6 +192,18 @@ class Rig:
         asked = np.ascontiguousarray(points, dtype=np.float64)
         triangle, barycentric, distance = self._fit.land(*_arrays(posture), asked)
         return triangle.astype(np.int64), barycentric, distance
+
+    def offset(self, skin: npt.ArrayLike, **settings: float) -> Any:
+        """What the scan is off ``skin`` (n, 3) m, smoothly along its normals.
+
+        Returns:
+            ``height`` (n,) m, ``along`` (n, 3) unit; ``start``, ``row``, ``values`` of the
+            precision, 1/m², by columns.
+        """
+        chosen = core().RigOffsetSettings()
+        for name, value in settings.items():
+            setattr(chosen, name, value)
+        return self._fit.offset(np.ascontiguousarray(skin, dtype=np.float64), chosen)
 
     def _landmarks(
         self, named: Mapping[str, npt.ArrayLike], sd: float | Mapping[str, float]

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.core import core
+from supple.errors import InputError
 from supple.registration.template import Template
 from supple.registration.weights import Weights
 
@@ -104,8 +105,18 @@ def priors_in_core(priors: Priors, template: Template) -> Any:
         if getattr(priors, name) is not None:
             setattr(made, name, np.asarray(getattr(priors, name), dtype=np.float64))
     if priors.blend_covariance is not None:
-        made.blend_precision = np.linalg.inv(np.asarray(priors.blend_covariance, dtype=np.float64))
+        made.blend_precision = _inverse(np.asarray(priors.blend_covariance, dtype=np.float64))
     if priors.bounded:
         made.blend_lower, made.blend_upper = template.blendshape_bounds.T
     made.scale_lower, made.scale_upper = priors.scale_bounds
     return made
+
+
+def _inverse(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """By the core: a BLAS' threads would wait, busy, in the way of the fit's own."""
+    if not covariance.size:
+        return covariance
+    inverse = core().inverse_sum(covariance, np.zeros_like(covariance))
+    if not len(inverse):
+        raise InputError("blend_covariance must be positive definite; give a larger variance.")
+    return np.asarray(inverse)

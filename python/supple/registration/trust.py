@@ -33,7 +33,7 @@ def doubts(
     breasts = template.regions["breast_left"] | template.regions["breast_right"]
     used = float((fit.used > 0.1).mean())
     seen = fit.vertex_used > 0.05
-    sd = float(rig.vertex_sd(fit.posture, covariance)[breasts].mean())
+    sd = float(rig.vertex_sd(fit.posture, covariance, breasts).mean())
     bounds = _at_bounds(fit, template.blendshape_bounds)
     share = {side: float(seen[template.regions[f"breast_{side}"]].mean())
              for side in ("left", "right")}  # fmt: skip

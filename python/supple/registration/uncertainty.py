@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from supple.core import core
 from supple.errors import InputError
 from supple.registration.posture import Posture
 from supple.registration.template import Floats, OnSurface, Template
@@ -53,10 +54,11 @@ def of_fit(found: RigFit, template: Template, patch: float = 15e-3) -> Floats:
     normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-300
     points = found.scan_points[used]
     residuals = np.einsum("kd,kd->k", points - landing, normal)
-    spent = np.trace(np.linalg.solve(found.data_matrix + found.prior_matrix, found.data_matrix))
-    free = 1 - float(spent) / max(found.observations, 1.0)
-    return covariance(found.data_matrix, found.prior_matrix,
-                      inflation(points, residuals, patch, found.noise, free))  # fmt: skip
+    inverse = _inverse(found.data_matrix, found.prior_matrix)
+    spent = len(inverse) - float((inverse * found.prior_matrix).sum())  # tr(H⁻¹ D)
+    free = 1 - spent / max(found.observations, 1.0)
+    noise = inflation(points, residuals, patch, found.noise, free)
+    return np.asarray(core().inflated(inverse, found.prior_matrix, noise))
 
 
 def covariance(data_matrix: Floats, prior_matrix: Floats, inflation: float = 1.0) -> Floats:
@@ -81,16 +83,15 @@ def covariance(data_matrix: Floats, prior_matrix: Floats, inflation: float = 1.0
             f"data_matrix and prior_matrix must be of one size, got {data_matrix.shape} and "
             f"{prior_matrix.shape}."
         )
-    whole = data_matrix + prior_matrix
-    scale = 1 / np.sqrt(np.maximum(np.diagonal(whole), 1e-300))
-    try:
-        root = np.linalg.inv(np.linalg.cholesky(whole * scale[:, None] * scale))
-    except np.linalg.LinAlgError:
-        raise InputError(
-            "the data and the prior leave an unknown free; give the posture a prior."
-        ) from None
-    inverse = (root.T @ root) * scale[:, None] * scale
-    return np.asarray(inverse @ (inflation * data_matrix + prior_matrix) @ inverse)
+    inverse = _inverse(data_matrix, prior_matrix)
+    return np.asarray(core().inflated(inverse, prior_matrix, inflation))
+
+
+def _inverse(data_matrix: Floats, prior_matrix: Floats) -> Floats:
+    inverse: Floats = core().inverse_sum(data_matrix, prior_matrix)
+    if not len(inverse):
+        raise InputError("the data and the prior leave an unknown free; give the posture a prior.")
+    return inverse
 
 
 def inflation(points: Floats, residuals: Floats, patch: float, assumed: float,
@@ -133,14 +134,10 @@ def correlated(points: Floats, residuals: Floats) -> Correlogram:
     every = -(-len(points) // _OTHERS)
     points, residuals = points[::every], residuals[::every]
     anchors = np.unique(np.linspace(0, len(points) - 1, _ANCHORS).astype(np.int64))
-    apart = _distances(points[anchors], points)
     rings = round(_FAR / _RING)
-    ring = np.minimum((apart / _RING).astype(np.int64), rings)
-    ring[np.arange(len(anchors)), anchors] = rings  # a point is no neighbour of itself
-    products = residuals[anchors, None] * residuals
-    count = np.bincount(ring.ravel(), minlength=rings + 1)[:rings]
-    sums = np.bincount(ring.ravel(), products.ravel(), minlength=rings + 1)[:rings]
-    mean: Floats = (sums / np.maximum(count, 1)).astype(np.float64)
+    near = core().residual_rings(points, residuals, anchors.astype(np.int32), _RING, rings)
+    count = near.count
+    mean: Floats = near.sum / np.maximum(count, 1)
     edges = _RING * np.arange(rings + 1)
     areas: Floats = np.pi * np.diff(edges**2)
     per_area = count[1:6].sum() / len(anchors) / areas[1:6].sum()  # points a m² of skin
@@ -208,8 +205,3 @@ def radius(variances: Floats, share: float) -> Floats:
     total, squares = variances.sum(axis=1), (variances**2).sum(axis=1)
     freedom = np.divide(total**2, squares, out=np.full_like(total, 3.0), where=squares > 0)
     return np.asarray(np.sqrt(2 * gammaincinv(freedom / 2, share) * total / freedom))
-
-
-def _distances(a: Floats, b: Floats) -> Floats:
-    squares = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
