@@ -23,7 +23,7 @@ import numpy.typing as npt
 from supple.errors import InputError
 from supple.registration import uncertainty
 from supple.registration.body_prior import body_prior
-from supple.registration.found_landmarks import found_landmarks
+from supple.registration.found_landmarks import astray, found_landmarks
 from supple.registration.initial_pose import Candidate, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
 from supple.registration.offset import Offset, offset
@@ -227,10 +227,14 @@ def _result(
     keep: RegisterSettings, clock: _Clock,
 ) -> Registration:  # fmt: skip
     covariance = uncertainty.of_fit(fit, rig.template)
-    warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts)
-    history = [value for one in [*(rival.fit for rival in rivals[:1]), fit] for value in one.history]
+    points = fit.points + moved.vectors
+    off = astray(scan, rig.template, fit.posture, points, keep.doubts.sure) if rivals else 0.0
+    warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off)
+    history = [
+        value for one in [*(rival.fit for rival in rivals[:1]), fit] for value in one.history
+    ]
     return Registration(
-        rig.template, fit.posture, fit.points + moved.vectors, scan, moved.vectors,
+        rig.template, fit.posture, points, scan, moved.vectors,
         moved.precision, covariance, not warnings, warnings, clock.stop(), len(history), history,
         _reach(fit), fit,
     )  # fmt: skip

@@ -25,20 +25,24 @@ class Doubts:
     sd: float = 12e-3  #: largest mean standard deviation of the breasts' vertices
     rival: float = 1.2  #: more must speak against the next facing than the best, by this factor
     offset: float = 3e-3  #: largest rms by which seen skin leaves what bones and shapes can do
-    shape: float = 2.6  #: largest rms of the shapes, in standard deviations
+    shape: float = 13.0  #: largest distance of all shapes together, in standard deviations
+    sizes: float = 1.2  #: largest rms of the bones' scales, in standard deviations
     turns: float = 1.0  #: largest rms of the bones' turns against their parents, likewise
+    astray: float = 20e-3  #: a nipple further than this from one that surely shows
+    sure: float = 0.55  #: the confidence of that
     at_bounds: float = 0.2  #: largest share of the blend's coefficients at their bounds
 
 
 def doubts(
     rig: Rig, fit: RigFit, offset: Floats, rivals: Sequence[Rival], covariance: Floats,
-    limits: Doubts,
+    limits: Doubts, astray: float = 0.0,
 ) -> list[str]:  # fmt: skip
     """One sentence a reason not to trust ``fit``.
 
     Args:
         offset: (n, 3) m of the last stage.
         rivals: facings that were compared, the chosen one first; none where a start was given.
+        astray: m from a nipple of the fit to where the scan shows one.
     """
     template = rig.template
     breasts = template.regions["breast_left"] | template.regions["breast_right"]
@@ -50,7 +54,8 @@ def doubts(
              for side in ("left", "right")}  # fmt: skip
     ratio = _rival(rivals)
     away = float(np.sqrt((offset[seen] ** 2).sum(axis=1).mean())) if seen.any() else 0.0
-    shape = _deviations(fit.energy["blendshape"], len(fit.posture.blend))
+    shape = _deviations(fit.energy["blendshape"], 1)
+    sizes = _deviations(fit.energy["scale"], 3 * len(template.bones))
     turns = _deviations(fit.energy["rotation"], 3 * len(template.bones))
     found = {
         f"The scan lies {1e3 * fit.residual_sd:.1f} mm (sd) from the skin, more than "
@@ -69,7 +74,11 @@ def doubts(
         ),
         f"The skin had to leave what the template can become by {1e3 * away:.1f} mm (rms), more "
         f"than {1e3 * limits.offset:.1f} mm; check where the landmarks are.": away > limits.offset,
-        f"The shapes are {shape:.1f} standard deviations (rms) from the template's, more than "
+        f"The scan shows a nipple {1e3 * astray:.0f} mm from where the fit has it, more than "
+        f"{1e3 * limits.astray:.0f} mm; give landmarks.": astray > limits.astray,
+        f"The bones' sizes are {sizes:.1f} standard deviations (rms) from a body's, more than "
+        f"{limits.sizes:g}; check that the scan is a torso, in metres.": sizes > limits.sizes,
+        f"The shapes are {shape:.1f} standard deviations from the template's, more than "
         f"{limits.shape:g}; check that the drawing is on the breasts.": shape > limits.shape,
         f"The bones are turned by {turns:.1f} standard deviations (rms), more than "
         f"{limits.turns:g}; check that the scan is one body, the right way round.": (
