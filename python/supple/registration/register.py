@@ -171,7 +171,8 @@ def _fine(
 ) -> RigFit:  # fmt: skip
     """All shapes; held loosely to the scan first, tightly once they turn out to follow it.
 
-    A body that the template cannot become pulls its landmarks away if it is followed closely.
+    A body that the template cannot become pulls its landmarks away if it is followed closely;
+    the less it follows, the looser it is held.
     """
     priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
@@ -179,7 +180,8 @@ def _fine(
         fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds)
         first, stages = fit.posture, stages[-1:]
         if fit.patch_sd > keep.follows:
-            priors = loose
+            grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
+            priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
     return rig.fit(first, stages, keep.weights, priors, marks, sds)
 
 
