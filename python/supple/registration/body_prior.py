@@ -8,11 +8,11 @@ from supple.registration.rig import Priors
 from supple.registration.template import Floats, Template
 
 #: rad, of a bone's turn against its parent. Arms go anywhere; a breast hardly turns.
-TURN = {"abdomen": 0.3, "chest": 0.25, "neck": 0.3, "shoulder": 0.35, "arm": 0.9, "breast": 0.25}
+TURN = {"abdomen": 0.3, "chest": 0.25, "neck": 0.3, "shoulder": 0.35, "arm": 0.9, "breast": 0.07}
 #: Of a bone's scale along an axis against its parent's.
-SCALE = {"abdomen": 0.1, "chest": 0.05, "neck": 0.07, "shoulder": 0.05, "arm": 0.06, "breast": 0.1}
+SCALE = {"abdomen": 0.1, "chest": 0.05, "neck": 0.07, "shoulder": 0.05, "arm": 0.06, "breast": 0.06}
 #: Of a coefficient, in that of its shape, and how alike the two sides of a body are.
-SHAPE, ALIKE = 0.7, 0.8
+SHAPE, ALIKE = 1.0, 0.9
 
 
 def body_prior(template: Template, shape: float = SHAPE, alike: float = ALIKE) -> Priors:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from supple.registration.posture import Posture
 from supple.registration.register_settings import RegisterSettings
 from supple.registration.rig import Rig
-from supple.registration.template import Floats
+from supple.registration.template import Floats, Template
 from supple.surface import Surface
+
+if TYPE_CHECKING:
+    from supple.registration.auto_landmarks import Proposal
 
 
 def found_landmarks(
@@ -23,14 +27,33 @@ def found_landmarks(
     marks, sds = dict(named), dict.fromkeys(named, keep.landmark_sd)
     if keep.sure is None:
         return marks, sds
-    from supple.registration.auto_landmarks import propose
-
-    chest = [bone.name for bone in rig.template.bones].index("chest")
-    R, joint = posture.rotations[chest], rig.template.joints[chest]
-    upright = R.T, joint - R.T @ (joint + posture.translations[chest])
     at = rig.template.landmark_points(rig.vertices(posture))
-    for name, one in propose(scan, upright).items():
+    for name, one in proposed(scan, rig.template, posture).items():
         near = np.linalg.norm(one.point - at[name]) < keep.found_reach if name in at else False
         if near and name not in marks and one.confidence >= keep.sure and "nipple" in name:
             marks[name], sds[name] = one.point, keep.found_sd / one.confidence
     return marks, sds
+
+
+def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, Proposal]:
+    """What the scan shows, seen from the front of the body that ``posture`` puts there."""
+    from supple.registration.auto_landmarks import propose
+
+    names = [bone.name for bone in template.bones]
+    if "chest" not in names:
+        return {}
+    chest = names.index("chest")
+    R, joint = posture.rotations[chest], template.joints[chest]
+    return propose(scan, (R.T, joint - R.T @ (joint + posture.translations[chest])))
+
+
+def astray(
+    scan: Surface, template: Template, posture: Posture, points: Floats, sure: float
+) -> float:
+    """Largest distance, m, of a nipple of the fit ``points`` (n, 3) m to one that surely shows."""
+    at = template.landmark_points(points)
+    return max(
+        (float(np.linalg.norm(one.point - at[name]))
+         for name, one in proposed(scan, template, posture).items()
+         if "nipple" in name and name in at and one.confidence >= sure), default=0.0,
+    )  # fmt: skip

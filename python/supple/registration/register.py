@@ -2,7 +2,8 @@
 
 1. scan       thinned, with normals
 2. start      given, from landmarks, or searched: all rotations, arms down or up
-3. coarse     rigid, bones, scales; of the rival starts the best goes on
+3. coarse     rigid, bones, scales
+   facing     of those that face differently, the likeliest goes on
 4. landmarks  where asked for: nipples found on the scan join those given
 5. fine       all shapes, the robust threshold shrinking to the noise
 6. offset     what bones and shapes cannot reach, smoothly
@@ -22,7 +23,7 @@ import numpy.typing as npt
 from supple.errors import InputError
 from supple.registration import uncertainty
 from supple.registration.body_prior import body_prior
-from supple.registration.found_landmarks import found_landmarks
+from supple.registration.found_landmarks import astray, found_landmarks
 from supple.registration.initial_pose import Candidate, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
 from supple.registration.offset import Offset, offset
@@ -30,6 +31,7 @@ from supple.registration.posture import Posture
 from supple.registration.register_settings import RegisterSettings
 from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
+from supple.registration.rivals import Rival, contenders, decided
 from supple.registration.template import Floats, Template
 from supple.registration.trust import doubts
 from supple.surface import Surface
@@ -78,8 +80,10 @@ def register(
     starts = _starts(rig, named, keep, start)
     clock.stage("coarse")
     tried = [] if start is not None else _coarse(rig, starts, named, keep)
+    clock.stage("facing")
+    rivals = _rivals(rig, tried, named, keep)
     clock.stage("landmarks")
-    first = tried[0].posture if tried else starts[0].posture
+    first = rivals[0].fit.posture if rivals else starts[0].posture
     marks, sds = found_landmarks(scan, rig, first, named, keep) if tried else (
         named, dict.fromkeys(named, keep.landmark_sd))  # fmt: skip
     clock.stage("fine")
@@ -88,7 +92,7 @@ def register(
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("judge")
-    return _result(rig, scan, fit, moved, tried, starts, keep, clock)
+    return _result(rig, scan, fit, moved, rivals, keep, clock)
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
@@ -160,7 +164,8 @@ def _fine(
 ) -> RigFit:  # fmt: skip
     """All shapes; held loosely to the scan first, tightly once they turn out to follow it.
 
-    A body that the template cannot become pulls its landmarks away if it is followed closely.
+    A body that the template cannot become pulls its landmarks away if it is followed closely;
+    the less it follows, the looser it is held.
     """
     priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
@@ -168,16 +173,34 @@ def _fine(
         fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
         first, stages = fit.posture, stages[-1:]
         if fit.patch_sd > keep.follows:
-            priors = loose
+            grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
+            priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
     return rig.fit(first, stages, keep.weights, priors, marks, sds)
 
 
 def _coarse(rig: Rig, starts: list[Candidate], named: Mapping[str, Floats],
             keep: RegisterSettings) -> list[RigFit]:  # fmt: skip
     """Coarse fits of the starts that are nearly as good as the best, best first."""
-    near = [one for one in starts if one.score <= keep.rival * starts[0].score][: keep.starts]
+    near = contenders(starts, rig.template, np.median(rig.cloud.points, axis=0), keep)
+    if len(named) >= 3:
+        near = starts[: keep.starts]
     fits = [_run(rig, one.posture, keep.coarse, named, keep) for one in near]
     return sorted(fits, key=lambda fit: coarse_score(fit, keep.coarse[-1].reach))
+
+
+def _rivals(
+    rig: Rig, tried: list[RigFit], named: Mapping[str, Floats], keep: RegisterSettings
+) -> list[Rival]:
+    """The best of each facing, fitted loosely with all shapes; the likeliest first."""
+    priors = keep.priors or Priors()
+    loose = replace(priors, noise=max(priors.noise, keep.unlike))
+    scores = [coarse_score(fit, keep.coarse[-1].reach) for fit in tried]
+    return decided(
+        list(zip(scores, tried, strict=True)), rig.template,
+        lambda fit: rig.fit(
+            fit.posture, keep.fine[:1], keep.weights, loose, named, keep.landmark_sd),
+        keep,
+    )  # fmt: skip
 
 
 def coarse_score(fit: RigFit, reach: float) -> float:
@@ -192,14 +215,18 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
 
 
 def _result(
-    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, tried: list[RigFit],
-    starts: list[Candidate], keep: RegisterSettings, clock: _Clock,
+    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, rivals: list[Rival],
+    keep: RegisterSettings, clock: _Clock,
 ) -> Registration:  # fmt: skip
     covariance = uncertainty.of_fit(fit, rig.template)
-    warnings = doubts(rig, fit, tried, starts, covariance, keep.doubts)
-    history = [value for one in [*tried[:1], fit] for value in one.history]
+    points = fit.points + moved.vectors
+    off = astray(scan, rig.template, fit.posture, points, keep.doubts.sure) if rivals else 0.0
+    warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off)
+    history = [
+        value for one in [*(rival.fit for rival in rivals[:1]), fit] for value in one.history
+    ]
     return Registration(
-        rig.template, fit.posture, fit.points + moved.vectors, scan, moved.vectors,
+        rig.template, fit.posture, points, scan, moved.vectors,
         moved.precision, covariance, not warnings, warnings, clock.stop(), len(history), history,
         _reach(fit), fit,
     )  # fmt: skip

@@ -47,6 +47,9 @@ class RegisterSettings:
     found_reach: float = 50e-3  #: a landmark found further from the coarse fit is not used
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
+    facing: float = 1.4  #: and one that faces otherwise within this; its coarse fit within
+    faced: float = 1.7  #: this factor goes on
+    turned: float = 0.9  #: rad between two facings
     doubts: Doubts = field(default_factory=Doubts)
     #: None: bones and shapes alone
     offset: OffsetSettings | None = field(default_factory=OffsetSettings)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from supple.registration.initial_pose import Candidate
 from supple.registration.rig import Rig, RigFit
 from supple.registration.template import Floats
+
+if TYPE_CHECKING:
+    from supple.registration.rivals import Rival
 
 
 @dataclass(frozen=True)
@@ -19,16 +23,27 @@ class Doubts:
     on_skin: float = 0.5  #: least share of the scan that is the body's
     seen: float = 0.35  #: least share of the skin of the breasts, and of the front, that is seen
     sd: float = 12e-3  #: largest mean standard deviation of the breasts' vertices
-    rival: float = 1.1  #: another pose must be worse than the best by this factor
-    turned: float = 0.6  #: rad; poses that differ by less are one
+    rival: float = 1.2  #: more must speak against the next facing than the best, by this factor
+    offset: float = 3e-3  #: largest rms by which seen skin leaves what bones and shapes can do
+    shape: float = 13.0  #: largest distance of all shapes together, in standard deviations
+    sizes: float = 1.2  #: largest rms of the bones' scales, in standard deviations
+    turns: float = 1.0  #: largest rms of the bones' turns against their parents, likewise
+    astray: float = 20e-3  #: a nipple further than this from one that surely shows
+    sure: float = 0.55  #: the confidence of that
     at_bounds: float = 0.2  #: largest share of the blend's coefficients at their bounds
 
 
 def doubts(
-    rig: Rig, fit: RigFit, tried: list[RigFit], starts: list[Candidate], covariance: Floats,
-    limits: Doubts,
+    rig: Rig, fit: RigFit, offset: Floats, rivals: Sequence[Rival], covariance: Floats,
+    limits: Doubts, astray: float = 0.0,
 ) -> list[str]:  # fmt: skip
-    """One sentence a reason not to trust ``fit``."""
+    """One sentence a reason not to trust ``fit``.
+
+    Args:
+        offset: (n, 3) m of the last stage.
+        rivals: facings that were compared, the chosen one first; none where a start was given.
+        astray: m from a nipple of the fit to where the scan shows one.
+    """
     template = rig.template
     breasts = template.regions["breast_left"] | template.regions["breast_right"]
     used = float((fit.used > 0.1).mean())
@@ -37,7 +52,11 @@ def doubts(
     bounds = _at_bounds(fit, template.blendshape_bounds)
     share = {side: float(seen[template.regions[f"breast_{side}"]].mean())
              for side in ("left", "right")}  # fmt: skip
-    rival = _rival(fit, tried, starts, limits)
+    ratio = _rival(rivals)
+    away = float(np.sqrt((offset[seen] ** 2).sum(axis=1).mean())) if seen.any() else 0.0
+    shape = _deviations(fit.energy["blendshape"], 1)
+    sizes = _deviations(fit.energy["scale"], 3 * len(template.bones))
+    turns = _deviations(fit.energy["rotation"], 3 * len(template.bones))
     found = {
         f"The scan lies {1e3 * fit.residual_sd:.1f} mm (sd) from the skin, more than "
         f"{1e3 * limits.residual:.0f} mm; check that it shows a bare torso, in metres.": (
@@ -49,7 +68,22 @@ def doubts(
         f"{1e3 * limits.sd:.0f} mm; scan more of the front.": sd > limits.sd,
         f"{bounds:.0%} of the shapes are at their bounds, more than {limits.at_bounds:.0%}; "
         "the body is unlike any that the template can be.": bounds > limits.at_bounds,
-        "Another pose fits nearly as well; give three landmarks, or scan more of the body.": rival,
+        f"A body that faces another way is nearly as plausible ({ratio:.2f} times the energy, less "
+        f"than {limits.rival:g}); give three landmarks, or scan more of the body.": (
+            ratio < limits.rival
+        ),
+        f"The skin had to leave what the template can become by {1e3 * away:.1f} mm (rms), more "
+        f"than {1e3 * limits.offset:.1f} mm; check where the landmarks are.": away > limits.offset,
+        f"The scan shows a nipple {1e3 * astray:.0f} mm from where the fit has it, more than "
+        f"{1e3 * limits.astray:.0f} mm; give landmarks.": astray > limits.astray,
+        f"The bones' sizes are {sizes:.1f} standard deviations (rms) from a body's, more than "
+        f"{limits.sizes:g}; check that the scan is a torso, in metres.": sizes > limits.sizes,
+        f"The shapes are {shape:.1f} standard deviations from the template's, more than "
+        f"{limits.shape:g}; check that the drawing is on the breasts.": shape > limits.shape,
+        f"The bones are turned by {turns:.1f} standard deviations (rms), more than "
+        f"{limits.turns:g}; check that the scan is one body, the right way round.": (
+            turns > limits.turns
+        ),
     }
     for side, part in share.items():
         found[f"The scan shows {part:.0%} of the {side} breast, less than {limits.seen:.0%}; "
@@ -66,13 +100,13 @@ def _at_bounds(fit: RigFit, bounds: Floats) -> float:
     return float((at & (np.abs(blend) > 1e-6)).mean())
 
 
-def _rival(fit: RigFit, tried: list[RigFit], starts: list[Candidate], limits: Doubts) -> bool:
-    """Whether a pose that is turned by more than ``limits.turned`` is nearly as good."""
-    if not tried or not starts[0].score:
-        return False
-    for one in starts[1:]:
-        turned = one.posture.rotations[0] @ fit.posture.rotations[0].T
-        angle = float(np.arccos(np.clip((np.trace(turned) - 1) / 2, -1, 1)))
-        if angle > limits.turned and one.score < limits.rival * starts[0].score:
-            return True
-    return False
+def _rival(rivals: Sequence[Rival]) -> float:
+    """How much more speaks against the next facing than against the chosen."""
+    if len(rivals) < 2:
+        return float("inf")
+    return float(rivals[1].against / max(rivals[0].against, 1e-9))
+
+
+def _deviations(energy: float, count: int) -> float:
+    """Root mean square, in standard deviations, of ``count`` unknowns with ½ Σ z² = ``energy``."""
+    return float(np.sqrt(2 * energy / max(count, 1)))
