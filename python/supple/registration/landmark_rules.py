@@ -111,7 +111,7 @@ def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
     It joins the two deepest valleys of the left half.
     """
     near = _neighbours(points, triangles)
-    return points[_joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)]
+    return np.asarray(points[_joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)])
 
 
 def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[int]]:

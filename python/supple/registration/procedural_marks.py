@@ -53,7 +53,8 @@ def _saddle(near: Floats) -> Floats:
     from scipy.optimize import fsolve
 
     def off(p: Floats) -> Floats:
-        return np.r_[body.level(p[None]), 0.01 * body.slope(p[None], 1e-4)[0, :2]]
+        level, slope = body.level(p[None]), body.slope(p[None], 1e-4)[0, :2]
+        return np.asarray(np.r_[level, 0.01 * slope])
 
     return np.asarray(fsolve(off, near))
 
