@@ -183,8 +183,8 @@ def test_a_fit_that_is_not_trustworthy_is_written_marked_and_exits_with_3(
         (["{scan}", "--unit", "parsec"], "parsec"),
         (["{scan}", "--start", "{bad}"], "parameters"),
         (["{scan}", "--out", "{scan}"], "--out"),
-        (["{scan}", "--samples", "3"], "--study"),
-        (["{scan}", "--study"], "--study"),
+        (["{scan}", "--samples", "3"], "--samples and --data are of --study; leave"),
+        (["{scan}", "--study"], "--study takes no SCAN, .*; leave"),
         ([], "SCAN"),
     ],
 )

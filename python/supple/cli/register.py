@@ -55,10 +55,11 @@ def register(
     energy (thesis, figures 9 to 13), on synthetic scans, to --out (default: out/register-study).
     """
     if study:
-        _no_others("--study", scan, template, landmarks, unit, start)
+        _only("--study takes no SCAN, --template, --landmarks, --unit or --start",
+              scan, template, landmarks, unit, start)  # fmt: skip
         _study(run, samples or 3, data)
         return
-    _no_others("a scan without --study", samples, data)
+    _only("--samples and --data are of --study", samples, data)
     if scan is None:
         raise InputError("SCAN is missing; give the file of a surface scan, or --study.")
     from ..registration.output import write
@@ -72,10 +73,9 @@ def register(
     tell(run, outcome)
 
 
-def _no_others(with_what: str, *given: object) -> None:
+def _only(rule: str, *given: object) -> None:
     if any(value is not None for value in given):
-        raise InputError(f"{with_what} takes --samples and --data only together with --study, and "
-                         "then no scan; leave one out.")  # fmt: skip
+        raise InputError(f"{rule}; leave them out.")
 
 
 def _study(run: Run, samples: int, data: Path | None) -> None:

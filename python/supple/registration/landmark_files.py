@@ -159,7 +159,10 @@ def _fcsv(text: str, file: Path) -> _Raw:
 
 def _json(text: str, file: Path) -> _Raw:
     raw = _Raw([], [])
-    for markup in json.loads(text)["markups"]:
+    whole = json.loads(text)
+    if not isinstance(whole, dict) or "markups" not in whole:
+        raise ValueError("it holds no 'markups', as 3D Slicer's do")
+    for markup in whole["markups"]:
         points = markup.get("controlPoints", [])
         code = markup.get("coordinateUnits", "mm")
         unit = code if isinstance(code, str) else str(code[0])
