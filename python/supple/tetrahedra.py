@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.signals import signals_kept
 
 Points = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -40,6 +41,7 @@ def _path(start: NDArray[np.intp], steps: list[int], axes: tuple[int, ...]) -> N
     return np.asarray(path if even else path[:, [0, 2, 1, 3]])
 
 
+@signals_kept()
 def cut_along_zero(points: Points, cells: Ints, values: Points) -> tuple[Points, Ints]:
     """The part of a mesh where the `values` (n,) of its nodes are negative: nodes, cells."""
     from mmgpy import MmgMesh3D
@@ -55,6 +57,7 @@ def cut_along_zero(points: Points, cells: Ints, values: Points) -> tuple[Points,
     return compact(mesh.get_vertices(), cells[sides == INSIDE])[:2]
 
 
+@signals_kept()
 def remesh(
     points: Points, cells: Ints, edges: Points, *, gradation: float, chord: float | None
 ) -> tuple[Points, Ints]:

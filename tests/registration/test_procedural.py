@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 
 import numpy as np
@@ -256,3 +257,10 @@ def test_it_is_made_in_less_than_a_second_and_always_the_same(template: Template
 def test_a_spacing_that_makes_no_torso_is_refused(spacing: float) -> None:
     with pytest.raises(InputError, match="spacing"):
         torso(spacing)
+
+
+def test_ctrl_c_still_reaches_python() -> None:
+    """Mmg's own handler would end the process."""
+    torso(0.036)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)

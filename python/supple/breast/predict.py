@@ -14,8 +14,6 @@ Lengths are mm in files, m inside; LPS everywhere.
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -112,7 +110,7 @@ def predict(case: Case, place: Place, watch: Watch = lambda stage, share: None) 
     with clock("segment"):
         anatomy = _anatomy(case, image.image)
         require_in_breast(anatomy.labels, case.tumour_mm)
-    with clock("mesh"), _signals_kept():
+    with clock("mesh"):
         mesh = build_mesh(
             anatomy.labels, edge_mm=case.edge_mm, tumour_mm=case.tumour_mm,
             tumour_diameter_mm=case.tumour_diameter_mm or DIAMETER,
@@ -134,18 +132,6 @@ def predict(case: Case, place: Place, watch: Watch = lambda stage, share: None) 
     with clock("check"):
         checks = check(outcome)
     return write(outcome, checks, place, clock)
-
-
-@contextmanager
-def _signals_kept() -> Iterator[None]:
-    """Ctrl-C and termination reach Python again afterwards: Mmg installs handlers of its own."""
-    handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        if threading.current_thread() is threading.main_thread():
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
 
 
 def require_inside(image: sitk.Image, point: Point) -> None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from supple.errors import InputError
 from supple.registration import procedural_body as body
+from supple.signals import signals_kept
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -136,6 +137,7 @@ def _clipped(
     return all_points[used], renamed.reshape(-1, 3)
 
 
+@signals_kept()
 def _remeshed(points: Floats, triangles: Ints, spacing: float) -> tuple[Floats, Ints]:
     """By Mmg; the border keeps its place, since Mmg holds open edges as ridges."""
     from mmgpy import MmgMeshS
