@@ -130,17 +130,30 @@ def test_what_is_no_scan_is_refused() -> None:
 _NIPPLE_SLIDES = pytest.mark.xfail(reason="a nipple that the scan shows little of slides by 25 mm")
 
 
+@lru_cache(maxsize=4)
+def _three_fits(pose: str) -> list[tuple[SyntheticScan, Registration]]:
+    """Three shapes in a pose, and what was found."""
+    scans = [_scan(pose, 10 + seed, rotation=0.0 if pose == "tilted" else 45.0)
+             for seed in range(3)]  # fmt: skip
+    return [(scan, register(scan.surface, _template())) for scan in scans]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pose", POSES)
+def test_no_pose_loses_the_skin(pose: str) -> None:
+    """Within 2 mm on average; trusted or it says why."""
+    for scan, found in _three_fits(pose):
+        assert found.skin.closest(scan.clean[scan.skin]).distance.mean() < 2e-3
+        assert found.trustworthy == (not found.warnings)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("pose", [
     pytest.param(pose, marks=_NIPPLE_SLIDES if pose in ("supine", "tilted") else ())
     for pose in POSES
 ])  # fmt: skip
-def test_poses_do_not_fail(pose: str) -> None:
-    """Three shapes each: skin within 5 mm, each landmark within 20 mm; trusted or it says why."""
-    for seed in range(3):
-        scan = _scan(pose, 10 + seed, rotation=0.0 if pose == "tilted" else 45.0)
-        found = register(scan.surface, _template())
+def test_no_pose_loses_a_landmark(pose: str) -> None:
+    """Each within 20 mm."""
+    for seed, (scan, found) in enumerate(_three_fits(pose)):
         apart = [np.linalg.norm(found.landmarks[k] - v) for k, v in scan.truth.landmarks.items()]
-        assert found.skin.closest(scan.clean[scan.skin]).distance.mean() < 2e-3
         assert max(apart) < 0.02, (pose, seed, max(apart))
-        assert found.trustworthy == (not found.warnings)

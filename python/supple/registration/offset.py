@@ -29,7 +29,6 @@ class OffsetSettings:
     patch: float = 15e-3  #: its side
     rounds: int = 3  #: of new partners
     reach: float = 25e-3  #: partners further away are none
-    rms_said: float = 2e-3  #: a displacement that is larger on the whole is said
 
 
 @dataclass(frozen=True, eq=False)
