@@ -323,8 +323,9 @@ def assert_derivative(found, change, name):
         d = [(change(h / k) - change(-h / k)) / (2 * h / k) for k in (1, 2, 4)]
         first, second = (4 * d[1] - d[0]) / 3, (4 * d[2] - d[1]) / 3
         expected = (16 * second - first) / 15
-        if not found.any() and not expected.any():
-            return  # R does not depend on it: fibres that are slack everywhere
+        rounding = 32 * np.finfo(float).eps * abs(change(h)).max() / h
+        if not found.any() and abs(expected).max() <= rounding:
+            return  # R does not depend on it: fibres that are slack, or short of their limit
         errors.append(abs(found - expected).max() / abs(expected).max())
         if errors[-1] <= 1e-8:
             return

@@ -156,6 +156,12 @@ def test_a_load_without_a_rest_shape_fails_in_three_times_a_good_search(share):
 
 @pytest.mark.slow
 def test_a_beam_too_soft_fails_in_three_times_a_good_solve():
-    """45 kPa is the softest that is stable when level, by 5 %; 20 kPa bear half of the load."""
+    """45 kPa is the softest that is stable when level, by 5 %; 20 kPa bear half of the load.
+
+    Counted in residuals and tangents: of 30 ms a machine's clock makes what it likes.
+    """
     cells = (20, 4, 4)
-    assert seconds(beam(2e4, cells).rest_shape) <= 3 * seconds(beam(4.5e4, cells).rest_shape)
+    good = beam(4.5e4, cells).rest_shape()
+    with pytest.raises(supple.ConvergenceError) as failed:
+        beam(2e4, cells).rest_shape()
+    assert len(failed.value.history) <= 3 * len(good.history)
