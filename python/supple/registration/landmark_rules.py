@@ -13,6 +13,9 @@ _XIPHOID = 0.9
 _CHORD, _DEEP = 0.13, 0.10
 #: mm along the profile over which it turns at the notch.
 _ARM = 30
+#: The medial edge of a breast, of its nipple's distance from the midline; m behind the fold, where
+#: the front of a section ends.
+_MEDIAL, _BEHIND = 0.3, 0.02
 #: m around the armpit's apex, where its front fold is.
 _NEAR = 0.08
 
@@ -72,11 +75,55 @@ def xiphoid_height(notch: float, fold: float) -> float:
 
 def sagittal(points: Floats, triangles: npt.NDArray[np.int64], x: float) -> Floats:
     """Points (k, 3) m where edges of the skin cross the plane of that ``x`` m, in any order."""
+    return _section(points, triangles, 0, x)
+
+
+def _section(points: Floats, triangles: npt.NDArray[np.int64], axis: int, at: float) -> Floats:
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     a, b = points[edges[:, 0]], points[edges[:, 1]]
-    cut = (a[:, 0] < x) != (b[:, 0] < x)
-    share = ((x - a[cut, 0]) / (b[cut, 0] - a[cut, 0]))[:, None]
+    cut = (a[:, axis] < at) != (b[:, axis] < at)
+    share = ((at - a[cut, axis]) / (b[cut, axis] - a[cut, axis]))[:, None]
     return np.asarray((1 - share) * a[cut] + share * b[cut])
+
+
+def breast_edges(
+    points: Floats, triangles: npt.NDArray[np.int64], nipple: Floats, fold: Floats
+) -> tuple[Floats, Floats]:
+    """The medial and the lateral edge (3,) m of the left breast, at its nipple's height.
+
+    Medial: at 0.3 of the nipple's distance from the midline. Lateral: beside the nipple, where the
+    skin is as deep as the ``fold`` below it; nearer to the nipple than the arm's.
+    """
+    level = _section(points, triangles, 2, float(nipple[2]))
+    front = level[(level[:, 0] > 0) & (level[:, 0] < nipple[0]) & (level[:, 1] < fold[1] + _BEHIND)]
+    front = front[np.argsort(front[:, 0])]
+    x = _MEDIAL * float(nipple[0])
+    medial = np.array([x, np.interp(x, front[:, 0], front[:, 1]), nipple[2]])
+    beside = level[level[:, 0] > nipple[0]]
+    beside = beside[np.argsort(np.linalg.norm(beside - nipple, axis=1), kind="stable")]
+    first = max(int(np.argmax(beside[:, 1] > fold[1])), 1)
+    before, behind = beside[first - 1], beside[first]
+    share = (fold[1] - before[1]) / (behind[1] - before[1])
+    return medial, np.asarray((1 - share) * before + share * behind)
+
+
+def drawn_through(outline: Floats, anchors: Floats) -> Floats:
+    """A closed ``outline`` (k, 3) m shifted so that it passes through ``anchors`` (a, 3) m.
+
+    Its highest point stays; between there and the anchors the shift changes smoothly along it.
+    """
+    ends = np.linalg.norm(outline[:, None] - anchors, axis=2).argmin(axis=0)
+    knots = np.r_[ends, outline[:, 2].argmax()]
+    shifts = np.vstack([anchors - outline[ends], np.zeros(3)])
+    order = np.argsort(knots, kind="stable")
+    knots, shifts = knots[order], shifts[order]
+    number = np.arange(len(outline))
+    right = np.searchsorted(knots, number, side="right") % len(knots)
+    left = right - 1
+    span = (knots[right] - knots[left]) % len(outline)
+    share = ((number - knots[left]) % len(outline)) / np.maximum(span, 1)
+    smooth = (share * share * (3 - 2 * share))[:, None]
+    return np.asarray(outline + (1 - smooth) * shifts[left] + smooth * shifts[right])
 
 
 def fold_below(points: Floats, triangles: npt.NDArray[np.int64], nipple: Floats) -> Floats:

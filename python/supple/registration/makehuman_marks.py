@@ -10,8 +10,9 @@ import numpy.typing as npt
 from supple.errors import MeshError
 from supple.registration.landmark_rules import (
     axilla,
+    breast_edges,
+    drawn_through,
     fold_below,
-    level_with,
     notch_height,
     xiphoid_height,
 )
@@ -134,19 +135,18 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
     return skin.nearest(smooth, closed=True)
 
 
-def landmarks(skin: Skin, nipple: Floats, outline: OnSurface) -> dict[str, OnSurface]:
+def landmarks(skin: Skin, nipple: Floats) -> dict[str, OnSurface]:
     """LANDMARKS; ``nipple`` (n,) is how far its targets move.
 
-    Nipple: the middle of what moves with the nipple's tip. Medial, lateral: of the breast's outline
-    at the nipple's height; inferior: the fold below the nipple. Xiphoid: on the profile, 0.9 of the
+    Nipple: the middle of what moves with the nipple's tip. Medial, lateral: the breast's edges at
+    the nipple's height; inferior: the fold below the nipple. Xiphoid: on the profile, 0.9 of the
     way down from the notch to the folds.
     """
-    around = skin.at(outline)
     tip = np.where(skin.points[:, 0] > 0, nipple, 0.0)
     tip = np.where(tip > 0.8 * tip.max(), tip, 0.0)
     summit = tip @ skin.points / tip.sum()
-    medial, lateral = level_with(around, summit)
     fold = fold_below(skin.points, skin.triangles, summit)
+    medial, lateral = breast_edges(skin.points, skin.triangles, summit, fold)
     marks = {
         "nipple": skin.nearest(summit),
         "axilla": skin.nearest(axilla(skin.points, skin.triangles)),
@@ -164,7 +164,13 @@ def landmarks(skin: Skin, nipple: Floats, outline: OnSurface) -> dict[str, OnSur
 
 
 def curves(skin: Skin, marks: dict[str, OnSurface], outline: OnSurface) -> dict[str, OnSurface]:
-    """CURVES: arrows from the notch down and from the xiphoid up; the outlines of the breasts."""
+    """CURVES: arrows from the notch down and from the xiphoid up; the outlines of the breasts.
+
+    These are drawn through the landmarks around the breast.
+    """
+    around = ("breast_medial_left", "breast_inferior_left", "breast_lateral_left")
+    anchors = np.vstack([skin.at(marks[name]) for name in around])
+    outline = skin.nearest(drawn_through(skin.at(outline), anchors), closed=True)
     top, low = (skin.at(marks[name])[0, 2] for name in ("sternal_notch", "xiphoid"))
     middle, gap = (top + low) / 2, 0.005
     return {
