@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,19 +43,20 @@ def found_landmarks(
 
 def told_landmarks(
     scan: Surface, template: Template, posture: Posture, offset: Floats, points: Floats,
-    seen: npt.NDArray[np.bool_],
+    seen: npt.NDArray[np.bool_], slid: Collection[str] = (),
 ) -> tuple[dict[str, Floats], dict[str, float], float]:  # fmt: skip
     """Landmarks (3,) m as the shape of a fit tells them, and the tips of nipples that stand out.
 
     Args:
         offset, points: (n, 3) m, what moved the skin off ``posture``, and its vertices then.
         seen: (n,) which vertices the scan shows.
+        slid: names of landmarks that are known to have slid.
 
     Returns:
         Places, standard deviations, and the furthest from where the fit has one, m.
     """
     skin = at_rest(template, posture, offset)
-    found = evidence(template, skin, points, seen)
+    found = evidence(template, skin, points, seen, slid)
     marks = dict(zip(found.names, found.places, strict=True))
     sds = dict(zip(found.names, found.sds, strict=True))
     at = template.landmark_points(points)
@@ -63,8 +64,8 @@ def told_landmarks(
     for name, one in refine(scan, near).items():
         if one.confidence > ON_SKIN:
             marks[name], sds[name] = one.point, TIP
-    slid = [float(np.linalg.norm(place - at[name])) for name, place in marks.items()]
-    return marks, sds, max(slid, default=0.0)
+    apart = [float(np.linalg.norm(place - at[name])) for name, place in marks.items()]
+    return marks, sds, max(apart, default=0.0)
 
 
 def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, Proposal]:

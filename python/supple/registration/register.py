@@ -5,7 +5,8 @@
 3. coarse     rigid, bones, scales
    facing     of those that face differently, the likeliest goes on
 4. landmarks  where asked for: nipples found on the scan join those given
-5. fine       all shapes, the robust threshold shrinking to the noise
+5. fine       all shapes, the robust threshold shrinking to the noise; landmarks that slid along
+              the skin are pulled to where the body's own shape tells them to be
 6. offset     what bones and shapes cannot reach, smoothly
 7. judge      is the fit to be trusted, and if not, why
 """
@@ -87,8 +88,8 @@ def register(
     marks, sds = found_landmarks(scan, rig, first, named, keep) if tried else (
         named, dict.fromkeys(named, keep.landmark_sd))  # fmt: skip
     clock.stage("fine")
-    stages = keep.fine if tried else keep.warm
-    fit = _fine(rig, scan, first, stages, marks, sds, keep)
+    stages, rounds = (keep.fine, keep.told) if tried else (keep.warm, 0)
+    fit = _fine(rig, scan, first, stages, marks, sds, replace(keep, told=rounds))
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("judge")
@@ -167,36 +168,37 @@ def _fine(
     A body that the template cannot become pulls its landmarks away if it is followed closely;
     the less it follows, the looser it is held.
     """
-    priors, given = keep.priors or Priors(), (marks, sds)
+    priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
         fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
+        fit, marks, sds = _told(rig, scan, fit, stages[:-1], loose, marks, sds, keep)
         first, stages = fit.posture, stages[-1:]
-        marks, sds, slid = _told(rig, scan, fit, given, keep)
         if fit.patch_sd > keep.follows:
             grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
             priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
-    fit = rig.fit(first, stages, keep.weights, priors, marks, sds)
-    for _ in range(keep.told - 1):
-        marks, sds, slid = _told(rig, scan, fit, given, keep)
-        if slid < keep.slid:
-            break
-        fit = rig.fit(fit.posture, stages, keep.weights, priors, marks, sds)
-    return fit
+    return rig.fit(first, stages, keep.weights, priors, marks, sds)
 
 
 def _told(
-    rig: Rig, scan: Surface, fit: RigFit, given: tuple[Mapping[str, Floats], Mapping[str, float]],
-    keep: RegisterSettings,
-) -> tuple[Mapping[str, Floats], Mapping[str, float], float]:  # fmt: skip
-    """The landmarks given, and those that the fit's own shape puts elsewhere; how far, m."""
-    if not keep.told:
-        return *given, 0.0
-    moved = _offset(rig, fit, keep).vectors
-    marks, sds, slid = told_landmarks(
-        scan, rig.template, fit.posture, moved, fit.points + moved, fit.vertex_used > 0
-    )
-    return marks | dict(given[0]), sds | dict(given[1]), slid
+    rig: Rig, scan: Surface, fit: RigFit, stages: tuple[Stage, ...], loose: Priors,
+    given: Mapping[str, Floats], given_sds: Mapping[str, float], keep: RegisterSettings,
+) -> tuple[RigFit, Mapping[str, Floats], Mapping[str, float]]:  # fmt: skip
+    """The landmarks given, and those that the fit's own shape puts elsewhere.
+
+    Where they slid far, ``fit`` is made again with them, and asked once more.
+    """
+    marks, sds = dict(given), dict(given_sds)
+    for left in reversed(range(keep.told)):
+        moved = _offset(rig, fit, keep).vectors
+        found, of_found, far = told_landmarks(
+            scan, rig.template, fit.posture, moved, fit.points + moved, fit.vertex_used > 0, marks
+        )
+        marks, sds = found | dict(given), of_found | dict(given_sds)
+        if not left or far < keep.slid:
+            break
+        fit = rig.fit(fit.posture, stages, keep.weights, loose, marks, sds, False)
+    return fit, marks, sds
 
 
 def _coarse(rig: Rig, starts: list[Candidate], named: Mapping[str, Floats],
