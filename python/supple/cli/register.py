@@ -112,7 +112,7 @@ def fitted(
     found = read_scan(scan, unit)
     said, given = list(found.said), {}
     if marks is not None:
-        checked = check_on_scan(marks, found.surface)
+        checked = check_on_scan(marks, found.surface, torso)
         said, given = [*said, *checked.said], dict(checked.points)
     settings = RegisterSettings()
     fit = work(found.surface, torso, given or None, settings, posture, run.progress)

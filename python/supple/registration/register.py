@@ -20,8 +20,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from supple.errors import InputError
+from supple.errors import ConvergenceError, InputError
 from supple.registration import uncertainty
+from supple.registration.advice import advised, too_little
 from supple.registration.body_prior import body_prior
 from supple.registration.found_landmarks import astray, found_landmarks
 from supple.registration.initial_pose import Candidate, candidates
@@ -64,11 +65,24 @@ def register(
         InputError: landmarks that the template does not name, a scan that is no body in metres.
         ConvergenceError: nothing of the template comes near the scan.
     """
-    keep, clock = settings or RegisterSettings(), _Clock(progress)
+    keep = settings or RegisterSettings()
     if template is None:
         from supple.registration.procedural import torso
 
         template = torso()
+    try:
+        found = _stages(scan, template, landmarks, keep, start, progress)
+    except ConvergenceError as error:
+        reason = too_little(scan, template, start is not None)
+        raise ConvergenceError(reason, cause=str(error)) from None
+    return advised(found, landmarks, keep.landmark_sd)
+
+
+def _stages(
+    scan: Surface, template: Template, landmarks: Mapping[str, npt.ArrayLike] | None,
+    keep: RegisterSettings, start: Posture | None, progress: Callable[[str], None] | None,
+) -> Registration:  # fmt: skip
+    clock = _Clock(progress)
     clock.stage("scan")
     _check(scan)
     named = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
