@@ -81,7 +81,7 @@ def test_inches_are_asked_for_never_guessed(tmp_path):
     """A torso of 0.5 m is 19.7 in, which may be 19.7 cm."""
     points, triangles = body()
     file = ply(tmp_path / "s.ply", points / 0.0254, triangles)
-    with pytest.raises(InputError, match="unit='cm' or unit='in'"):
+    with pytest.raises(InputError, match="--unit cm .*or --unit in"):
         read_scan(file)
     np.testing.assert_allclose(read_scan(file, unit="in").surface.points, points, atol=1e-12)
 

@@ -122,7 +122,8 @@ def _unit(
         if low <= spread < high:
             return metres(unit), f"The file names no unit: {unit}, as the landmarks' spread tells."
     raise InputError(f"{file} names no unit and its landmarks are up to {spread:.4g} apart, which "
-                     "is no torso in m, cm or mm; give unit=.")  # fmt: skip
+                     "is no torso in m, cm or mm; write them in mm, with a comment '# unit mm' "
+                     "or columns x_mm, y_mm, z_mm in a .csv file.")  # fmt: skip
 
 
 def _frame(named: str | None, given: str | None, file: Path) -> tuple[Floats, str]:

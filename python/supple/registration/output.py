@@ -21,6 +21,7 @@ import numpy.typing as npt
 import supple
 from supple.errors import InputError
 from supple.files import existing
+from supple.registration.body_size import body_size
 from supple.registration.measures import Measures, measures
 from supple.registration.metrics import Metrics, metrics
 from supple.registration.posture import Posture
@@ -46,6 +47,7 @@ class Outcome:
     title: str = ""
     said: Sequence[str] = ()  #: what was found or mended on reading
     weights: Mapping[str, float] = field(default_factory=dict)  #: of the energy
+    unit: str = ""  #: that the scan was read in
 
     @cached_property
     def curves(self) -> dict[str, Carried]:
@@ -82,6 +84,8 @@ class Outcome:
             "warnings": list(fit.warnings),
             "said": list(self.said),
             "metrics": asdict(m),
+            "body": asdict(body_size(fit)),
+            "scan_unit": self.unit,
             "measures": [asdict(row) for row in self.measures.rows],
             "ptosis": dict(self.measures.ptosis),
             "landmarks": {k: 1e3 * c.points[0] for k, c in self.landmarks.items()},
