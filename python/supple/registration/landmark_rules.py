@@ -40,6 +40,28 @@ def notch_height(points: Floats, nipple: float) -> float:
     return float(place[np.where(place > nipple, turn, -np.inf).argmax()])
 
 
+def turning(line: Floats) -> tuple[Floats, Floats, Floats]:
+    """How much a sagittal ``line`` (k, 3) m, from below upwards, turns from chest to neck.
+
+    Returns:
+        Of points every mm along a spline through it: length (j,) m, turn (j,) rad between 30 mm
+        before and after, NaN next to the ends, and the points (j, 3) m.
+    """
+    from scipy.interpolate import CubicSpline
+
+    step = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    own = np.r_[0, np.cumsum(np.maximum(step, 1e-6))]
+    even = np.arange(0, own[-1], 1e-3)
+    curve = CubicSpline(own, line)(even)
+    arm = curve[_ARM:, 1:] - curve[:-_ARM, 1:]
+    before, after = arm[:-_ARM].T, arm[_ARM:].T
+    turn = np.full(len(even), np.nan)
+    turn[_ARM:-_ARM] = np.arctan2(
+        before[0] * after[1] - before[1] * after[0], (before * after).sum(axis=0)
+    )
+    return even, turn, curve
+
+
 def xiphoid_height(notch: float, fold: float) -> float:
     """Height of the xiphoid on the midline, from those of notch and folds, m.
 
@@ -111,7 +133,7 @@ def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
     It joins the two deepest valleys of the left half.
     """
     near = _neighbours(points, triangles)
-    return np.asarray(points[_joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)])
+    return np.asarray(points[joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)])
 
 
 def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[int]]:
@@ -122,7 +144,7 @@ def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[in
     return near
 
 
-def _joining(height: Floats, kept: npt.NDArray[np.int64], near: list[set[int]]) -> int:
+def joining(height: Floats, kept: npt.NDArray[np.int64], near: list[set[int]]) -> int:
     """The vertex where, with the level rising, the deepest second valley meets another.
 
     Edelsbrunner and Harer (2010), Computational Topology, VII.1: the merge of most persistence.

@@ -66,3 +66,13 @@ def posed(template: Template, posture: Posture) -> Floats:
     offsets = offsets - np.einsum("kij,kj->ki", affine, template.joints)
     of_vertices = np.tensordot(template.weights, affine, axes=1)
     return np.asarray(np.einsum("nij,nj->ni", of_vertices, shape) + template.weights @ offsets)
+
+
+def attached(template: Template, rotations: Floats, scales: Floats, blend: Floats) -> Posture:
+    """The posture whose shifts carry each joint to where its parent carries it; the root rests."""
+    shifts, joints = np.zeros_like(scales), template.joints
+    for k, parent in enumerate(template.parents):
+        if parent >= 0:
+            arm = scales[parent] * (joints[k] - joints[parent])
+            shifts[k] = rotations[parent] @ arm + joints[parent] + shifts[parent] - joints[k]
+    return Posture(rotations, shifts, scales, blend)

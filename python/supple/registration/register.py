@@ -31,6 +31,7 @@ from supple.registration.offset import Offset, offset
 from supple.registration.posture import Posture
 from supple.registration.register_settings import RegisterSettings
 from supple.registration.registration import Registration
+from supple.registration.rest_landmarks import at_rest, evidence
 from supple.registration.rig import Priors, Rig, RigFit, Stage
 from supple.registration.rivals import Rival, contenders, decided
 from supple.registration.template import Floats, Template
@@ -181,15 +182,35 @@ def _fine(
     A body that the template cannot become pulls its landmarks away if it is followed closely;
     the less it follows, the looser it is held.
     """
-    priors = keep.priors or Priors()
+    priors, given = keep.priors or Priors(), (marks, sds)
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
         fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
         first, stages = fit.posture, stages[-1:]
+        marks, sds, slid = _told(rig, fit, given, keep)
         if fit.patch_sd > keep.follows:
             grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
             priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
-    return rig.fit(first, stages, keep.weights, priors, marks, sds)
+    fit = rig.fit(first, stages, keep.weights, priors, marks, sds)
+    for _ in range(keep.told - 1):
+        marks, sds, slid = _told(rig, fit, given, keep)
+        if slid < keep.slid:
+            break
+        fit = rig.fit(fit.posture, stages, keep.weights, priors, marks, sds)
+    return fit
+
+
+def _told(
+    rig: Rig, fit: RigFit, given: tuple[Mapping[str, Floats], Mapping[str, float]],
+    keep: RegisterSettings,
+) -> tuple[Mapping[str, Floats], Mapping[str, float], float]:  # fmt: skip
+    """The landmarks given, and those that the fit's own shape puts elsewhere; how far, m."""
+    if not keep.told:
+        return *given, 0.0
+    moved = _offset(rig, fit, keep).vectors
+    skin = at_rest(rig.template, fit.posture, moved)
+    marks, sds, slid = evidence(rig.template, skin, fit.points + moved, fit.vertex_used > 0)
+    return marks | dict(given[0]), sds | dict(given[1]), slid
 
 
 def _coarse(rig: Rig, starts: list[Candidate], named: Mapping[str, Floats],

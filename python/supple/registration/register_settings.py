@@ -45,6 +45,8 @@ class RegisterSettings:
     sure: float | None = None  #: landmarks found with less confidence are not used; None: none are
     found_sd: float = 8e-3  #: of a landmark that is found for certain
     found_reach: float = 50e-3  #: a landmark found further from the coarse fit is not used
+    told: int = 1  #: rounds in which the body's own shape tells where its landmarks are
+    slid: float = 4e-3  #: m; less than this is not worth a round
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
     facing: float = 1.4  #: and one that faces otherwise within this; its coarse fit within

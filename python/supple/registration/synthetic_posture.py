@@ -10,7 +10,7 @@ import numpy.typing as npt
 from numpy.random import Generator
 
 from supple.errors import ConvergenceError, InputError
-from supple.registration.posture import Posture, posed
+from supple.registration.posture import Posture, attached, posed
 from supple.registration.synthetic_overlap import arms_in_body
 from supple.registration.synthetic_shape import random_blend
 from supple.registration.template import Template
@@ -74,16 +74,6 @@ def turned(random: Generator, degrees: float) -> Floats:
     """Rotation (3, 3) by ``degrees`` about a random axis."""
     axis = random.normal(size=3)
     return _rotation(np.radians(degrees) * axis / np.linalg.norm(axis))
-
-
-def attached(template: Template, rotations: Floats, scales: Floats, blend: Floats) -> Posture:
-    """The posture whose shifts carry each joint to where its parent carries it; the root rests."""
-    shifts, joints = np.zeros_like(scales), template.joints
-    for k, parent in enumerate(template.parents):
-        if parent >= 0:
-            arm = scales[parent] * (joints[k] - joints[parent])
-            shifts[k] = rotations[parent] @ arm + joints[parent] + shifts[parent] - joints[k]
-    return Posture(rotations, shifts, scales, blend)
 
 
 def _drawn(template: Template, habit: _Habit, random: Generator, shapes: float) -> Posture:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..registration.posture import Posture
+from ..registration.posture import Posture, attached
 from ..registration.synthetic import POSES, Pose, SyntheticScan, random_posture, synthetic_scan
-from ..registration.synthetic_posture import attached, turned
+from ..registration.synthetic_posture import turned
 from ..registration.template import Template
 from .torso_score import Score, score
 
