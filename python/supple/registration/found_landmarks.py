@@ -6,15 +6,21 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from supple.registration.posture import Posture
+from supple.registration.refine_landmarks import ON_SKIN, refine
 from supple.registration.register_settings import RegisterSettings
+from supple.registration.rest_landmarks import at_rest, evidence
 from supple.registration.rig import Rig
 from supple.registration.template import Floats, Template
 from supple.surface import Surface
 
 if TYPE_CHECKING:
     from supple.registration.auto_landmarks import Proposal
+
+#: m, of the tip of a nipple that stands out of the breast's round.
+TIP = 3e-3
 
 
 def found_landmarks(
@@ -33,6 +39,32 @@ def found_landmarks(
         if near and name not in marks and one.confidence >= keep.sure and "nipple" in name:
             marks[name], sds[name] = one.point, keep.found_sd / one.confidence
     return marks, sds
+
+
+def told_landmarks(
+    scan: Surface, template: Template, posture: Posture, offset: Floats, points: Floats,
+    seen: npt.NDArray[np.bool_],
+) -> tuple[dict[str, Floats], dict[str, float], float]:  # fmt: skip
+    """Landmarks (3,) m as the shape of a fit tells them, and the tips of nipples that stand out.
+
+    Args:
+        offset, points: (n, 3) m, what moved the skin off ``posture``, and its vertices then.
+        seen: (n,) which vertices the scan shows.
+
+    Returns:
+        Places, standard deviations, and the furthest from where the fit has one, m.
+    """
+    skin = at_rest(template, posture, offset)
+    found = evidence(template, skin, points, seen)
+    marks = dict(zip(found.names, found.places, strict=True))
+    sds = dict(zip(found.names, found.sds, strict=True))
+    at = template.landmark_points(points)
+    near = {name: marks.get(name, place) for name, place in at.items() if "nipple" in name}
+    for name, one in refine(scan, near).items():
+        if one.confidence > ON_SKIN:
+            marks[name], sds[name] = one.point, TIP
+    slid = [float(np.linalg.norm(place - at[name])) for name, place in marks.items()]
+    return marks, sds, max(slid, default=0.0)
 
 
 def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, Proposal]:

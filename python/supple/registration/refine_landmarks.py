@@ -17,6 +17,8 @@ Floats = npt.NDArray[np.float64]
 _REACH, _AROUND, _TIP = 0.018, 0.035, 4e-3
 #: A tip stands out at least this far, m, and this many times its standard error.
 _LEAST, _TIMES = 1.0e-3, 6.0
+#: The confidence of a landmark that shows nothing of its own, at most.
+ON_SKIN = 0.5
 
 
 def refine(scan: Surface, guesses: Mapping[str, npt.ArrayLike]) -> dict[str, Proposal]:
@@ -54,7 +56,7 @@ def _on_skin(near: Floats, guess: Floats, distance: float) -> Proposal:
     middle = close.mean(axis=0)
     normal = np.linalg.svd(close - middle)[2][2]
     point = guess - ((guess - middle) @ normal) * normal
-    return Proposal(point, 0.5 * float(np.exp(-distance / 0.008)), "the skin next to the guess")
+    return Proposal(point, ON_SKIN * float(np.exp(-distance / 0.008)), "the skin next to the guess")
 
 
 def _tip(near: Floats, guess: Floats) -> Proposal | None:

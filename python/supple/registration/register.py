@@ -24,14 +24,13 @@ from supple.errors import ConvergenceError, InputError
 from supple.registration import uncertainty
 from supple.registration.advice import advised, too_little
 from supple.registration.body_prior import body_prior
-from supple.registration.found_landmarks import astray, found_landmarks
+from supple.registration.found_landmarks import astray, found_landmarks, told_landmarks
 from supple.registration.initial_pose import Candidate, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
 from supple.registration.offset import Offset, offset
 from supple.registration.posture import Posture
 from supple.registration.register_settings import RegisterSettings
 from supple.registration.registration import Registration
-from supple.registration.rest_landmarks import at_rest, evidence
 from supple.registration.rig import Priors, Rig, RigFit, Stage
 from supple.registration.rivals import Rival, contenders, decided
 from supple.registration.template import Floats, Template
@@ -103,7 +102,7 @@ def _stages(
         named, dict.fromkeys(named, keep.landmark_sd))  # fmt: skip
     clock.stage("fine")
     stages = keep.fine if tried else keep.warm
-    fit = _fine(rig, first, stages, marks, sds, keep)
+    fit = _fine(rig, scan, first, stages, marks, sds, keep)
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("judge")
@@ -174,7 +173,7 @@ def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str
 
 
 def _fine(
-    rig: Rig, first: Posture, stages: tuple[Stage, ...], marks: Mapping[str, Floats],
+    rig: Rig, scan: Surface, first: Posture, stages: tuple[Stage, ...], marks: Mapping[str, Floats],
     sds: Mapping[str, float], keep: RegisterSettings,
 ) -> RigFit:  # fmt: skip
     """All shapes; held loosely to the scan first, tightly once they turn out to follow it.
@@ -187,13 +186,13 @@ def _fine(
     if len(stages) > 1 and keep.unlike > 0:
         fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
         first, stages = fit.posture, stages[-1:]
-        marks, sds, slid = _told(rig, fit, given, keep)
+        marks, sds, slid = _told(rig, scan, fit, given, keep)
         if fit.patch_sd > keep.follows:
             grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
             priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
     fit = rig.fit(first, stages, keep.weights, priors, marks, sds)
     for _ in range(keep.told - 1):
-        marks, sds, slid = _told(rig, fit, given, keep)
+        marks, sds, slid = _told(rig, scan, fit, given, keep)
         if slid < keep.slid:
             break
         fit = rig.fit(fit.posture, stages, keep.weights, priors, marks, sds)
@@ -201,15 +200,16 @@ def _fine(
 
 
 def _told(
-    rig: Rig, fit: RigFit, given: tuple[Mapping[str, Floats], Mapping[str, float]],
+    rig: Rig, scan: Surface, fit: RigFit, given: tuple[Mapping[str, Floats], Mapping[str, float]],
     keep: RegisterSettings,
 ) -> tuple[Mapping[str, Floats], Mapping[str, float], float]:  # fmt: skip
     """The landmarks given, and those that the fit's own shape puts elsewhere; how far, m."""
     if not keep.told:
         return *given, 0.0
     moved = _offset(rig, fit, keep).vectors
-    skin = at_rest(rig.template, fit.posture, moved)
-    marks, sds, slid = evidence(rig.template, skin, fit.points + moved, fit.vertex_used > 0)
+    marks, sds, slid = told_landmarks(
+        scan, rig.template, fit.posture, moved, fit.points + moved, fit.vertex_used > 0
+    )
     return marks | dict(given[0]), sds | dict(given[1]), slid
 
 

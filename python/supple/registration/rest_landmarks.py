@@ -33,6 +33,11 @@ SIDES = (("left", 1.0), ("right", -1.0))
 _NOTCH, _CORNER, _CLEAR = 0.07, 0.3, 1.2
 #: m around the axilla on the template, in which the armpit's saddle is sought.
 _ARMPIT = 0.09
+#: m; a rule that is further off than this has found something else.
+_FAR = 0.07
+#: m, by which the mirror image of a nipple at rest differs from the other (5 mm on random bodies).
+_ALIKE, _IMAGE = 6e-3, np.array([-1.0, 1.0, 1.0])
+_NONE = np.zeros(3), 0.0
 #: m below the foremost skin, whose mean is the breast's tip.
 _TIP = 2e-3
 
@@ -54,7 +59,7 @@ class Told:
 #: By the name of the landmark without its side. Of 80 random bodies of each template, at rest.
 TOLD = {
     "sternal_notch": Told(6e-3, 4e-3),
-    "nipple": Told(7e-3, 4e-3),
+    "nipple": Told(10e-3, 5e-3),
     "breast_inferior": Told(12e-3, 6e-3),
     "xiphoid": Told(10e-3, 6e-3),
     "axilla": Told(12e-3, 6e-3),
@@ -90,32 +95,64 @@ def told(template: Template, skin: Floats) -> dict[str, Floats]:
     return found
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Evidence:
+    """Where landmarks are to be, one a name.
+
+    Attributes:
+        names: (k) of them.
+        places: (k, 3) m, on the scan.
+        sds: (k) m.
+    """
+
+    names: list[str]
+    places: Floats
+    sds: list[float]
+
+
 def evidence(
     template: Template, skin: Floats, points: Floats, seen: npt.NDArray[np.bool_],
     rules: Mapping[str, Told] = TOLD,
-) -> tuple[dict[str, Floats], dict[str, float], float]:  # fmt: skip
-    """Where the scan has the landmarks that slid, (3,) m, with standard deviations.
+) -> Evidence:  # fmt: skip
+    """Where the scan has the landmarks that slid.
+
+    A nipple that the scan does not show is the mirror image of one that it shows.
 
     Args:
         skin: (n, 3) m at rest.
         points: (n, 3) m, the same vertices on the scan.
         seen: (n,) which of them the scan shows.
-
-    Returns:
-        Places and standard deviations by name, and the furthest that one slid, m.
     """
-    names, starts, places = _slid(template, skin, rules)
-    if not names:
-        return {}, {}, 0.0
-    hit = Surface(skin, template.triangles).closest(places)
+    wanted = _wanted(template, skin, seen, rules)
+    if not wanted:
+        return Evidence([], np.empty((0, 3)), [])
+    hit = Surface(skin, template.triangles).closest(np.array([one[0] for one in wanted.values()]))
     corners = template.triangles[hit.triangle]
-    shown = seen[corners].any(axis=1)
-    on_scan = np.einsum("kc,kcd->kd", hit.barycentric, points[corners])
-    kept = [i for i in range(len(names)) if shown[i]]
-    apart = np.linalg.norm(places - starts, axis=1)
-    return ({names[i]: on_scan[i] for i in kept},
-            {names[i]: rules[kind(names[i])].sd for i in kept},
-            float(apart[kept].max(initial=0.0)))  # fmt: skip
+    places = np.einsum("kc,kcd->kd", hit.barycentric, points[corners])
+    names = [name for name, on in zip(wanted, seen[corners].any(axis=1), strict=True)
+             if on or not wanted[name][2]]  # fmt: skip
+    number = {name: i for i, name in enumerate(wanted)}
+    return Evidence(
+        names, places[[number[name] for name in names]], [wanted[name][1] for name in names]
+    )
+
+
+def _wanted(
+    template: Template, skin: Floats, seen: npt.NDArray[np.bool_], rules: Mapping[str, Told]
+) -> dict[str, tuple[Floats, float, bool]]:
+    """Place (3,) m at rest, its sd (m), and whether it holds only if the scan shows that skin."""
+    at, steps = template.landmark_points(skin), _steps(template, skin, rules)
+    shown = {name: _shown(template, name, seen) for name in at}
+    wanted = {}
+    for name in at:
+        other = _opposite(name)
+        if kind(name) == "nipple" and not shown[name]:
+            if shown[other]:
+                wanted[name] = (at[other] + steps.get(other, _NONE)[0]) * _IMAGE, _ALIKE, False
+        elif name in steps:
+            step, sd = steps[name]
+            wanted[name] = at[name] + step, sd, True
+    return wanted
 
 
 def kind(name: str) -> str:
@@ -123,21 +160,34 @@ def kind(name: str) -> str:
     return name.removesuffix("_left").removesuffix("_right")
 
 
-def _slid(
+def _steps(
     template: Template, skin: Floats, rules: Mapping[str, Told]
-) -> tuple[list[str], Floats, Floats]:
-    """Names, places (k, 3) m by the fit and by the rules less their doubt."""
-    at, names = template.landmark_points(skin), []
-    starts, places = [], []
+) -> dict[str, tuple[Floats, float]]:
+    """From where the fit has landmarks to where the rules have them, (3,) m, and its sd, m.
+
+    What is within a rule's doubt says nothing: it would hold a landmark where the fit has it.
+    """
+    at, steps = template.landmark_points(skin), {}
     for name, place in told(template, skin).items():
-        if kind(name) not in rules:
-            continue
         step = place - at[name]
-        doubt = rules[kind(name)].doubt / max(float(np.linalg.norm(step)), 1e-9)
-        names.append(name)
-        starts.append(at[name])
-        places.append(at[name] + max(0.0, 1 - doubt**2) * step)
-    return names, np.reshape(starts, (-1, 3)), np.reshape(places, (-1, 3))
+        size = float(np.linalg.norm(step))
+        if kind(name) not in rules or not rules[kind(name)].doubt < size < _FAR:
+            continue
+        sure = 1 - (rules[kind(name)].doubt / size) ** 2
+        steps[name] = sure * step, rules[kind(name)].sd / sure
+    return steps
+
+
+def _shown(template: Template, name: str, seen: npt.NDArray[np.bool_]) -> bool:
+    return bool(seen[template.triangles[template.landmarks[name].triangle[0]]].any())
+
+
+def _opposite(name: str) -> str:
+    """The landmark of the other side."""
+    for side, other in (("_left", "_right"), ("_right", "_left")):
+        if name.endswith(side):
+            return name.removesuffix(side) + other
+    return name
 
 
 def _put(found: dict[str, Floats], name: str, place: Floats | None) -> None:
