@@ -25,13 +25,16 @@ struct RigPriors {
   /// m: data within patch × patch are one observation, however many points it holds: residuals of
   /// neighbours share their cause (sensor drift, a shape that the template lacks).
   double patch = 15e-3;
-  Eigen::VectorXd scale;       ///< (K) of s_k − s_parent; of the root, of s − 1
-  Eigen::VectorXd joint;       ///< (K) m of T_k(j_k) − T_parent(j_k); the root's is not used
-  Eigen::VectorXd rotation;    ///< (K) rad of a bone against its parent; the root's is not used
-  Eigen::VectorXd blend_mean;  ///< (A)
-  RowMatrix blend_precision;   ///< (A, A) inverse covariance of the blend
-  Eigen::VectorXd blend_lower; ///< (A)
-  Eigen::VectorXd blend_upper; ///< (A)
+  Eigen::VectorXd scale;      ///< (K) or (3K) of s_k − s_parent; of the root, of s − 1
+  Eigen::VectorXd scale_mean; ///< (3K) of the same; 0
+  Eigen::VectorXd joint;      ///< (K) m of T_k(j_k) − T_parent(j_k); the root's is not used
+  /// (K) or (3K) rad of log(R_parentᵀ R_k), along the parent's axes; the root's is not used
+  Eigen::VectorXd rotation;
+  Eigen::VectorXd rotation_mean; ///< (3K) of the same; 0
+  Eigen::VectorXd blend_mean;    ///< (A)
+  RowMatrix blend_precision;     ///< (A, A) inverse covariance of the blend
+  Eigen::VectorXd blend_lower;   ///< (A)
+  Eigen::VectorXd blend_upper;   ///< (A)
   double scale_lower = 0.5, scale_upper = 2.0;
   bool stiff_joints = false; ///< joints hold exactly, by Lagrange multipliers
   bool convex = false;       ///< Σ α = 1, α ≥ 0 (the thesis' blend)
