@@ -133,7 +133,7 @@ def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
     It joins the two deepest valleys of the left half.
     """
     near = _neighbours(points, triangles)
-    return np.asarray(points[joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)])
+    return np.asarray(points[_joining(points[:, 2], np.flatnonzero(points[:, 0] > 0), near)])
 
 
 def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[int]]:
@@ -144,7 +144,7 @@ def _neighbours(points: Floats, triangles: npt.NDArray[np.int64]) -> list[set[in
     return near
 
 
-def joining(height: Floats, kept: npt.NDArray[np.int64], near: list[set[int]]) -> int:
+def _joining(height: Floats, kept: npt.NDArray[np.int64], near: list[set[int]]) -> int:
     """The vertex where, with the level rising, the deepest second valley meets another.
 
     Edelsbrunner and Harer (2010), Computational Topology, VII.1: the merge of most persistence.

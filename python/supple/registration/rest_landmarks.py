@@ -16,9 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration.landmark_rules import (
-    fold_before,
     fold_of,
-    joining,
     sagittal,
     turning,
     xiphoid_height,
@@ -27,12 +25,9 @@ from supple.registration.posture import Posture, attached, posed
 from supple.registration.template import Floats, Ints, Template
 from supple.surface import Surface
 
-SIDES = (("left", 1.0), ("right", -1.0))
 #: m along the midline from where the fit has it, within which the notch is sought; rad that the
 #: profile turns there at least; and how much more than at any other corner there.
 _NOTCH, _CORNER, _CLEAR = 0.07, 0.3, 1.2
-#: m around the axilla on the template, in which the armpit's saddle is sought.
-_ARMPIT = 0.09
 #: m; a rule that is further off than this has found something else.
 _FAR = 0.07
 #: m, by which the mirror image of a nipple at rest differs from the other (5 mm on random bodies).
@@ -58,11 +53,10 @@ class Told:
 
 #: By the name of the landmark without its side. Of 80 random bodies of each template, at rest.
 TOLD = {
-    "sternal_notch": Told(6e-3, 4e-3),
-    "nipple": Told(10e-3, 5e-3),
-    "breast_inferior": Told(12e-3, 6e-3),
-    "xiphoid": Told(10e-3, 6e-3),
-    "axilla": Told(12e-3, 6e-3),
+    "sternal_notch": Told(6e-3, 2e-3),
+    "nipple": Told(10e-3, 2.5e-3),
+    "breast_inferior": Told(13e-3, 3e-3),
+    "xiphoid": Told(13e-3, 3e-3),
 }  # fmt: skip
 
 
@@ -84,12 +78,11 @@ def told(template: Template, skin: Floats) -> dict[str, Floats]:
     """Where the rules put landmarks, (3,) m, on ``skin`` (n, 3) m at rest; some may be missing."""
     at, found = template.landmark_points(skin), dict[str, Floats]()
     _put(found, "sternal_notch", _notch(template, skin))
-    for side, sign in SIDES:
+    for side in ("left", "right"):
         _put(found, f"nipple_{side}", _tip(template, skin, side))
         nipple = found.get(f"nipple_{side}", at[f"nipple_{side}"])
         _put(found, f"breast_inferior_{side}",
-             _fold(template, skin, nipple, float(at[f"breast_inferior_{side}"][0])))  # fmt: skip
-        _put(found, f"axilla_{side}", _axilla(template, skin, side, sign))
+             _fold(template, skin, nipple, at[f"breast_inferior_{side}"]))  # fmt: skip
     now = at | found
     _put(found, "xiphoid", _xiphoid(template, skin, now))
     return found
@@ -129,7 +122,8 @@ def evidence(
     hit = Surface(skin, template.triangles).closest(np.array([one[0] for one in wanted.values()]))
     corners = template.triangles[hit.triangle]
     places = np.einsum("kc,kcd->kd", hit.barycentric, points[corners])
-    names = [name for name, on in zip(wanted, seen[corners].any(axis=1), strict=True)
+    near = _grown(template, _grown(template, seen))
+    names = [name for name, on in zip(wanted, near[corners].any(axis=1), strict=True)
              if on or not wanted[name][2]]  # fmt: skip
     number = {name: i for i, name in enumerate(wanted)}
     return Evidence(
@@ -173,13 +167,20 @@ def _steps(
         size = float(np.linalg.norm(step))
         if kind(name) not in rules or not rules[kind(name)].doubt < size < _FAR:
             continue
-        sure = 1 - (rules[kind(name)].doubt / size) ** 2
+        sure = 1 - (rules[kind(name)].doubt / size) ** 4
         steps[name] = sure * step, rules[kind(name)].sd / sure
     return steps
 
 
 def _shown(template: Template, name: str, seen: npt.NDArray[np.bool_]) -> bool:
     return bool(seen[template.triangles[template.landmarks[name].triangle[0]]].any())
+
+
+def _grown(template: Template, seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Vertices (n,) that share a triangle with one that is ``seen``."""
+    grown = np.zeros_like(seen)
+    grown[template.triangles[seen[template.triangles].any(axis=1)]] = True
+    return grown
 
 
 def _opposite(name: str) -> str:
@@ -247,36 +248,14 @@ def _tip(template: Template, skin: Floats, side: str) -> Floats | None:
     return np.asarray(weight @ breast[near] / weight.sum())
 
 
-def _fold(template: Template, skin: Floats, nipple: Floats, aside: float) -> Floats | None:
-    """The crease below ``nipple`` in the sagittal section at x = ``aside`` m."""
+def _fold(template: Template, skin: Floats, nipple: Floats, fit: Floats) -> Floats | None:
+    """The crease half-way across from below the ``nipple`` to where the ``fit`` has it.
+
+    Folds are below their nipples within a cm, and the fit knows where across as well.
+    """
+    aside = (float(nipple[0]) + float(fit[0])) / 2
     line = sagittal(skin, template.triangles, aside)
     below = nipple[2] - line[:, 2]
     if ((below > 0) & (below < 0.13)).sum() < 4:
         return None
     return fold_of(line, np.array([aside, nipple[1], nipple[2]]))
-
-
-@lru_cache(maxsize=32)
-def _armpit(template: Template, side: str) -> tuple[Ints, list[set[int]]]:
-    """Vertices around an axilla of the template, and the neighbours of each vertex."""
-    at = template.landmark_points()[f"axilla_{side}"]
-    kept = np.flatnonzero(np.linalg.norm(template.points - at, axis=1) < _ARMPIT)
-    near: list[set[int]] = [set() for _ in template.points]
-    inside = np.isin(template.triangles, kept).all(axis=1)
-    for a, b in template.triangles[inside][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist():
-        near[a].add(b)
-        near[b].add(a)
-    return kept, near
-
-
-def _axilla(template: Template, skin: Floats, side: str, sign: float) -> Floats | None:
-    """The edge of the front fold at the armpit's saddle."""
-    kept, near = _armpit(template, side)
-    apex = joining(skin[:, 2], kept, near)
-    if apex < 0:
-        return None
-    line = sagittal(skin, template.triangles, float(skin[apex, 0]))
-    line = line[np.linalg.norm(line - skin[apex], axis=1) < _ARMPIT]
-    if not ((line[:, 2] > skin[apex, 2] - 0.02) & (line[:, 1] < skin[apex, 1])).any():
-        return None
-    return fold_before(line, skin[apex])
