@@ -10,6 +10,8 @@ namespace {
 using Vec3 = Eigen::Vector3d;
 using Index = Eigen::Index;
 constexpr double kDegree = 0.017453292519943295;
+/// Of so many vertices, one is held against sliding for all.
+constexpr std::size_t kSlide = 4;
 
 /// Mean of the two normals, so that the residual vanishes for any two points of one sphere: the
 /// curvature of a surface is no residual. Zero where the normals contradict each other.
@@ -188,9 +190,9 @@ void Matcher::from_template(const SkinState& state, const RigStage& stage, doubl
     row.loss = stage.loss;
     pairs.vertex_row[static_cast<std::size_t>(v)] = static_cast<int>(pairs.rows.size());
     pairs.rows.push_back(row);
-    if (!(stage.point_share > 0.0)) continue;
+    if (!(stage.point_share > 0.0) || i % kSlide != 0) continue;
     const Vec3 tangent = row.direction.unitOrthogonal();
-    row.weight *= stage.point_share;
+    row.weight *= stage.point_share * kSlide;
     for (const Vec3& along : {tangent, Vec3(row.direction.cross(tangent))}) {
       row.direction = along;
       pairs.rows.push_back(row);

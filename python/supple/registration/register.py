@@ -88,8 +88,7 @@ def register(
         named, dict.fromkeys(named, keep.landmark_sd))  # fmt: skip
     clock.stage("fine")
     stages = keep.fine if tried else keep.warm
-    before = rivals[0].fit if rivals and marks.keys() == named.keys() else None
-    fit = _fine(rig, first, stages, marks, sds, keep, before)
+    fit = _fine(rig, first, stages, marks, sds, keep)
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("judge")
@@ -161,17 +160,17 @@ def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str
 
 def _fine(
     rig: Rig, first: Posture, stages: tuple[Stage, ...], marks: Mapping[str, Floats],
-    sds: Mapping[str, float], keep: RegisterSettings, before: RigFit | None = None,
+    sds: Mapping[str, float], keep: RegisterSettings,
 ) -> RigFit:  # fmt: skip
     """All shapes; held loosely to the scan first, tightly once they turn out to follow it.
 
     A body that the template cannot become pulls its landmarks away if it is followed closely;
-    the less it follows, the looser it is held. ``before``: the loose fit, where it is known.
+    the less it follows, the looser it is held.
     """
     priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
-        fit = before or rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, "pairs")
+        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, "pairs")
         first, stages = fit.posture, stages[-1:]
         if fit.patch_sd > keep.follows:
             grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
@@ -199,7 +198,7 @@ def _rivals(
     return decided(
         list(zip(scores, tried, strict=True)), rig.template,
         lambda fit: rig.fit(
-            fit.posture, keep.fine[:1], keep.weights, loose, named, keep.landmark_sd, "pairs"),
+            fit.posture, keep.face, keep.weights, loose, named, keep.landmark_sd, "lead"),
         keep,
     )  # fmt: skip
 
