@@ -104,7 +104,7 @@ class Surface:
     @property
     def size(self) -> float:
         """Largest extent along an axis, m."""
-        return float(np.ptp(self.points, axis=0).max())
+        return max(float(np.ptp(self.points[:, axis])) for axis in range(3))
 
     @property
     def areas(self) -> Floats:

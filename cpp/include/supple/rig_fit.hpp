@@ -87,15 +87,21 @@ struct RigTerms {
   double total() const { return data + scale + blendshape + joint + landmark + rotation; }
 };
 
+/// What a fit says at its end: a `Lead` to another fit, pairs of the points that its last stage
+/// used; `Pairs`, those of all points, with what they spread; the `Whole`, matrices too.
+enum class RigReport { Lead, Pairs, Whole };
+
 struct RigFitResult {
   RigPosture posture;
+  Points points;               ///< (n, 3) m: the template's vertices there
+  int every_point = 1;         ///< so many of the thinned scan's were looked at
   bool converged = false;      ///< the last stage ended by tolerance, or flat
   double last_step = 0.0;      ///< m: largest movement of a vertex in the last iteration
   std::vector<int> iterations; ///< of each stage
   std::vector<double> history; ///< energy at the start of each iteration, of its own pairs
   std::vector<double> stage_seconds;
   RigTerms terms;               ///< at the end
-  Eigen::MatrixXd data_matrix;  ///< (9K+A)² Jᵀ W J of the data at the end, λ and sd included
+  Eigen::MatrixXd data_matrix;  ///< (9K+A)² Jᵀ W J of the data at the last step, λ and sd included
   Eigen::MatrixXd prior_matrix; ///< that of all other terms
   double residual_sd = 0.0;     ///< m: robust sd of the data's residuals
   double patch_sd = 0.0;        ///< m: robust sd of the mean residual of a patch
@@ -164,11 +170,10 @@ class RigFit {
   RigOffset offset(const Points& skin, const RigOffsetSettings& settings);
 
   /// From `start` through all stages. Bitwise the same for any number of threads.
-  /// `matrices`: the result's two are filled; a fit that only leads to the next needs none.
   /// @throws StateError without a scan; ShapeError; NumericalError when no pair is within reach.
   RigFitResult run(const RigPosture& start, const RigWeights& weights, const RigPriors& priors,
                    const std::vector<RigStage>& stages, const RigLandmarks& landmarks,
-                   bool matrices = true);
+                   RigReport report = RigReport::Whole);
 
   /// One evaluation with the pairs of `pairs_at`.
   RigEvaluation evaluate(const RigPosture& pairs_at, const RigPosture& at,

@@ -169,7 +169,7 @@ def _starts(
 
 def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str, Floats],
          keep: RegisterSettings) -> RigFit:  # fmt: skip
-    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd, False)
+    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd, "lead")
 
 
 def _fine(
@@ -184,7 +184,7 @@ def _fine(
     priors, given = keep.priors or Priors(), (marks, sds)
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
-        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
+        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, "pairs")
         first, stages = fit.posture, stages[-1:]
         marks, sds, slid = _told(rig, scan, fit, given, keep)
         if fit.patch_sd > keep.follows:
@@ -233,7 +233,7 @@ def _rivals(
     return decided(
         list(zip(scores, tried, strict=True)), rig.template,
         lambda fit: rig.fit(
-            fit.posture, keep.fine[:1], keep.weights, loose, named, keep.landmark_sd),
+            fit.posture, keep.face, keep.weights, loose, named, keep.landmark_sd, "lead"),
         keep,
     )  # fmt: skip
 
