@@ -86,7 +86,7 @@ def _study(run: Run, samples: int, data: Path | None) -> None:
     run.out_or(Path("out") / "register-study")
     written = torso.run(run.path("torso.csv").parent, samples, data, run.progress)
     run.result["files"] = [path.name for path in written]
-    run.say(f"{samples} bodies a pose; figures and tables of {', '.join(torso.SWEEPS)}")
+    run.say(f"bodies a pose: {samples}; figures and tables of {', '.join(torso.SWEEPS)}")
 
 
 def fitted(
@@ -156,7 +156,8 @@ def tell(run: Run, outcome: Outcome, seconds: float) -> None:
     ))  # fmt: skip
     on = sum(c.on_scan.sum() for c in outcome.curves.values())
     every = sum(len(c.points) for c in outcome.curves.values())
-    run.say(f"drawing: {100 * on / every:.0f} % on the scan, the rest on the registered skin")
+    held = "" if len(outcome.scan.triangles) else "; the scan is points alone, no surface"
+    run.say(f"drawing: {100 * on / every:.0f} % on the scan, the rest on the registered skin{held}")
     run.say(f"fitted in {m.seconds:.2f} s, {seconds:.1f} s with reading, measuring and writing; "
             "open report.html in a browser")  # fmt: skip
     if fit.trustworthy:
