@@ -28,3 +28,4 @@ void bind_blas(py::module_& module);
 void bind_multigrid(py::module_& module);
 void bind_linear(py::module_& module);
 void bind_rig(py::module_& module);
+void bind_pose_search(py::module_& module);

@@ -66,8 +66,10 @@ void bind_settings(py::module_& module) {
       .def_readwrite("noise", &RigPriors::noise)
       .def_readwrite("patch", &RigPriors::patch)
       .def_readwrite("scale", &RigPriors::scale)
+      .def_readwrite("scale_mean", &RigPriors::scale_mean)
       .def_readwrite("joint", &RigPriors::joint)
       .def_readwrite("rotation", &RigPriors::rotation)
+      .def_readwrite("rotation_mean", &RigPriors::rotation_mean)
       .def_readwrite("blend_mean", &RigPriors::blend_mean)
       .def_readwrite("blend_precision", &RigPriors::blend_precision)
       .def_readwrite("blend_lower", &RigPriors::blend_lower)
@@ -144,6 +146,8 @@ void bind_result(py::module_& module) {
   py::class_<RigFitResult>(module, "RigFitResult")
       .def_property_readonly("posture",
                              [](const RigFitResult& result) { return arrays(result.posture); })
+      .def_readonly("points", &RigFitResult::points)
+      .def_readonly("every_point", &RigFitResult::every_point)
       .def_readonly("converged", &RigFitResult::converged)
       .def_readonly("last_step", &RigFitResult::last_step)
       .def_readonly("iterations", &RigFitResult::iterations)
@@ -203,6 +207,7 @@ void bind_rig_itself(py::module_& module) {
 } // namespace
 
 void bind_rig(py::module_& module) {
+  bind_pose_search(module);
   bind_settings(module);
   bind_result(module);
   bind_rig_itself(module);
@@ -248,10 +253,12 @@ void bind_rig(py::module_& module) {
            [](RigFit& fit, const Array& R, const Points& t, const Points& s, const VectorXd& b,
               const supple::RigWeights& weights, const supple::RigPriors& priors,
               const std::vector<supple::RigStage>& stages, const Eigen::VectorXi& triangle,
-              const Points& barycentric, const Points& target, const VectorXd& sd, bool matrices) {
+              const Points& barycentric, const Points& target, const VectorXd& sd, int report) {
              const RigPosture start = posture(R, t, s, b);
              const supple::RigLandmarks landmarks{triangle, barycentric, target, sd};
-             return unlocked<RigFitResult>(
-                 [&] { return fit.run(start, weights, priors, stages, landmarks, matrices); });
+             return unlocked<RigFitResult>([&] {
+               return fit.run(start, weights, priors, stages, landmarks,
+                              static_cast<supple::RigReport>(report));
+             });
            });
 }

@@ -217,8 +217,10 @@ void bind_system(py::module_& module) {
            [](const System& s) { return s.has_energy() && s.kind() == supple::Kind::Cholesky; })
       .def(
           "unstable_directions",
-          [](System& system, const Vector& u) { return supple::unstable_directions(system, u); },
-          Unlocked())
+          [](System& system, const Vector& u, const System* inverse) {
+            return supple::unstable_directions(system, u, inverse);
+          },
+          Unlocked(), py::arg("u"), py::arg("inverse") = nullptr)
       .def("reset_timings", [](System& system) { system.timings = {}; })
       .def_readonly("timings", &System::timings)
       .def("solve", &solve);

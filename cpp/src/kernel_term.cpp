@@ -161,8 +161,8 @@ void KernelTerm::tangent(const ConstVector& u, double scale, const Scatter& map,
     constexpr int L = decltype(lanes)::value;
     scale_tangent(scale, A);
     if (lower_only(*tangent_)) mirror_lower<L>(tangent_->rows, A);
-    for (Index lane = 0; lane < count; ++lane)
-      scatter_add(map, first + lane, A + lane, values.data(), L);
+    const LaneCells cells{cells_.data() + first * cells_.cols(), count, nodes_, scalars_};
+    add_full<L>(cells, map, first, A, values.data());
   });
 }
 

@@ -99,13 +99,14 @@ GmresReport gmres(const Operator& matrix, const Operator& preconditioner, const 
   const double beta = w.norm();
   report.residual = beta / scale;
   HessenbergLeastSquares small(beta);
-  std::vector<Vector> basis;
+  std::vector<Vector> basis, moves;
   double length = beta;
   while (report.residual > settings.tolerance && report.iterations < settings.max_iterations &&
          length > 0.0 && !hopeless(report.iterations, report.residual, settings)) {
     basis.push_back(w / length);
     preconditioner(basis.back(), z);
     matrix(z, w);
+    moves.push_back(z);
     const double size = w.norm();
     std::vector<double> column = orthogonalise(basis, w);
     length = column.back();
@@ -114,13 +115,8 @@ GmresReport gmres(const Operator& matrix, const Operator& preconditioner, const 
     report.residual = small.residual() / scale;
   }
   const std::vector<double> y = small.solution();
-  if (!y.empty()) {
-    w.setZero();
-    for (std::size_t k = 0; k < y.size(); ++k)
-      w += y[k] * basis[k];
-    preconditioner(w, z);
-    x += z;
-  }
+  for (std::size_t k = 0; k < y.size(); ++k)
+    x += y[k] * moves[k];
   report.converged = report.residual <= settings.tolerance;
   return report;
 }

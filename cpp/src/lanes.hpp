@@ -107,6 +107,45 @@ void add_lower(const LaneCells& cells, const LowerScatter& map, Index first, con
   }
 }
 
+/// The block of local nodes a and b of all lanes, into rows of the whole matrix.
+template <int L, int rows, int columns>
+void add_rows(const LaneCells& cells, const Scatter& map, Index first, Index a, Index b,
+              const double* block, double* values) {
+  const std::ptrdiff_t width = cells.width(), row = std::ptrdiff_t{3 * cells.m + cells.s} * L;
+  const Index* stride = map.row_stride.data() + first * width + a;
+  const Index* position = map.position.data() + (first * width + a) * width + b;
+  for (Index lane = 0; lane < cells.count; ++lane, ++block) {
+    double* to = values + *position;
+    for (int i = 0; i < rows; ++i, to += *stride)
+      for (int j = 0; j < columns; ++j)
+        to[j] += block[i * row + j * L];
+    stride += width;
+    position += width * width;
+  }
+}
+
+/// values += the whole cell matrices.
+template <int L>
+void add_full(const LaneCells& cells, const Scatter& map, Index first, const double* A,
+              double* values) {
+  const std::ptrdiff_t d = 3 * cells.m + cells.s;
+  for (Index a = 0; a < cells.width(); ++a) {
+    const std::ptrdiff_t row = a < cells.m ? 3 * a : a + 2 * cells.m;
+    for (Index b = 0; b < cells.width(); ++b) {
+      const std::ptrdiff_t column = b < cells.m ? 3 * b : b + 2 * cells.m;
+      const double* block = A + (row * d + column) * L;
+      if (a < cells.m && b < cells.m)
+        add_rows<L, 3, 3>(cells, map, first, a, b, block, values);
+      else if (a < cells.m)
+        add_rows<L, 3, 1>(cells, map, first, a, b, block, values);
+      else if (b < cells.m)
+        add_rows<L, 1, 3>(cells, map, first, a, b, block, values);
+      else
+        add_rows<L, 1, 1>(cells, map, first, a, b, block, values);
+    }
+  }
+}
+
 /// Entries with column > row, from those below the diagonal.
 template <int L>
 void mirror_lower(std::ptrdiff_t d, double* A) {

@@ -52,19 +52,20 @@ Mat3 inverse_left(const Vec3& phi) {
   return Mat3::Identity() - 0.5 * cross + c * cross * cross;
 }
 
-JointRows turn_rows(const Vec3& turn) {
+/// Its derivative: exp(ω_k) R_k and exp(ω_p) R_p turn log(R_k R_pᵀ), seen from the parent, to
+/// log(exp(ω_k − ω_p) R_k R_pᵀ).
+JointRows turn_rows(const Mat3& parent, const Vec3& turn) {
   JointRows rows = JointRows::Zero();
-  const Mat3 inverse = inverse_left(turn);
-  rows.block<3, 3>(0, 0) = inverse;
-  rows.block<3, 3>(0, 9) = -inverse.transpose();
+  rows.block<3, 3>(0, 0) = parent.transpose() * inverse_left(parent * turn);
+  rows.block<3, 3>(0, 9) = -rows.block<3, 3>(0, 0);
   return rows;
 }
 
-/// Adds λ rowsᵀ rows and λ rowsᵀ residual for bone k and its parent.
-void add_pair(const Rig& rig, int k, const JointRows& rows, const Vec3& residual, double weight,
-              Normal& normal) {
-  const Eigen::Matrix<double, 18, 18> product = weight * rows.transpose() * rows;
-  const Eigen::Matrix<double, 18, 1> pull = weight * rows.transpose() * residual;
+/// Adds rowsᵀ Λ rows and rowsᵀ Λ residual, Λ = diag(weight), for bone k and its parent.
+void add_pair(const Rig& rig, int k, const JointRows& rows, const Vec3& residual,
+              const Vec3& weight, Normal& normal) {
+  const Eigen::Matrix<double, 18, 18> product = rows.transpose() * weight.asDiagonal() * rows;
+  const Eigen::Matrix<double, 18, 1> pull = rows.transpose() * weight.cwiseProduct(residual);
   const Index first[2] = {9 * k, 9 * rig.parent(k)};
   for (int a = 0; a < 2; ++a) {
     normal.gradient.segment<9>(first[a]) += pull.segment<9>(9 * a);
@@ -73,13 +74,25 @@ void add_pair(const Rig& rig, int k, const JointRows& rows, const Vec3& residual
   normal.matrix.block<9, 9>(first[0], first[1]) += product.block<9, 9>(0, 9); // k > parent: lower
 }
 
-Vec3 scale_gap(const Rig& rig, const RigPosture& posture, int k) {
+/// What bone k is scaled more than its parent, and more than bodies are on average.
+Vec3 scale_gap(const Rig& rig, const RigPosture& posture, const RigPriors& priors, int k) {
   const Vec3 reference = rig.parent(k) < 0 ? Vec3(Vec3::Ones()) : posture.scales[at(rig.parent(k))];
-  return posture.scales[at(k)] - reference;
+  return posture.scales[at(k)] - reference - priors.scale_mean.segment<3>(3 * k);
+}
+
+/// log(R_parentᵀ R_k), which is R_parentᵀ log(R_k R_parentᵀ), rad.
+Vec3 turn_gap(const Rig& rig, const RigPosture& posture, int k) {
+  const Mat3& R = posture.rotations[at(rig.parent(k))];
+  return R.transpose() * turn_of(posture.rotations[at(k)] * R.transpose());
 }
 
 double inverse_square(double sd) {
   return 1.0 / (sd * sd);
+}
+
+/// 1/sd² of bone k's three.
+Vec3 precision(const Eigen::VectorXd& sd, int k) {
+  return sd.segment<3>(3 * k).array().square().inverse();
 }
 
 void need(const char* what, bool good, const char* expected) {
@@ -91,13 +104,23 @@ void fill(Eigen::VectorXd& values, Index size, double value, const char* what) {
   require_size(what, values.size(), size, "or leave it empty");
 }
 
+/// One value a bone stands for all three axes.
+void fill_axes(Eigen::VectorXd& values, Index bones, double value, const char* what) {
+  if (values.size() != 3 * bones) {
+    fill(values, bones, value, what);
+    values = values.transpose().replicate(3, 1).reshaped().eval();
+  }
+}
+
 } // namespace
 
 RigPriors complete(const Rig& rig, RigPriors p) {
   const double inf = std::numeric_limits<double>::infinity();
-  fill(p.scale, rig.bones(), 0.1, "the scales' sd");
+  fill_axes(p.scale, rig.bones(), 0.1, "the scales' sd");
+  fill(p.scale_mean, 3 * rig.bones(), 0.0, "the scales' mean");
   fill(p.joint, rig.bones(), 1e-3, "the joints' sd");
-  fill(p.rotation, rig.bones(), 0.5, "the rotations' sd");
+  fill_axes(p.rotation, rig.bones(), 0.5, "the rotations' sd");
+  fill(p.rotation_mean, 3 * rig.bones(), 0.0, "the rotations' mean");
   fill(p.blend_mean, rig.shapes(), 0.0, "blend_mean");
   fill(p.blend_lower, rig.shapes(), -inf, "blend_lower");
   fill(p.blend_upper, rig.shapes(), inf, "blend_upper");
@@ -123,11 +146,11 @@ RigTerms prior_terms(const Rig& rig, const RigPosture& posture, const RigWeights
                      const RigPriors& priors) {
   RigTerms terms;
   for (int k = 0; k < rig.bones(); ++k) {
-    terms.scale += 0.5 * scale_gap(rig, posture, k).squaredNorm() * inverse_square(priors.scale[k]);
+    terms.scale +=
+        0.5 * scale_gap(rig, posture, priors, k).cwiseAbs2().dot(precision(priors.scale, k));
     if (rig.parent(k) < 0) continue;
-    const Mat3 relative =
-        posture.rotations[at(k)] * posture.rotations[at(rig.parent(k))].transpose();
-    terms.rotation += 0.5 * turn_of(relative).squaredNorm() * inverse_square(priors.rotation[k]);
+    const Vec3 turn = turn_gap(rig, posture, k) - priors.rotation_mean.segment<3>(3 * k);
+    terms.rotation += 0.5 * turn.cwiseAbs2().dot(precision(priors.rotation, k));
     if (!priors.stiff_joints)
       terms.joint +=
           0.5 * joint_gap(rig, posture, k).squaredNorm() * inverse_square(priors.joint[k]);
@@ -147,20 +170,21 @@ void add_priors(const Rig& rig, const RigPosture& posture, const RigWeights& wei
     JointRows rows = JointRows::Zero();
     rows.block<3, 3>(0, 6).setIdentity();
     rows.block<3, 3>(0, 15) = -Mat3::Identity();
-    const double scale = weights.scale * inverse_square(priors.scale[k]);
-    const Vec3 gap = scale_gap(rig, posture, k);
+    const Vec3 scale = weights.scale * precision(priors.scale, k);
+    const Vec3 gap = scale_gap(rig, posture, priors, k);
     if (p < 0) {
-      normal.matrix.diagonal().segment<3>(9 * k + 6).array() += scale;
-      normal.gradient.segment<3>(9 * k + 6) += scale * gap;
+      normal.matrix.diagonal().segment<3>(9 * k + 6) += scale;
+      normal.gradient.segment<3>(9 * k + 6) += scale.cwiseProduct(gap);
       continue;
     }
     add_pair(rig, k, rows, gap, scale, normal);
-    const Vec3 turn = turn_of(posture.rotations[at(k)] * posture.rotations[at(p)].transpose());
-    add_pair(rig, k, turn_rows(turn), turn, weights.joint * inverse_square(priors.rotation[k]),
-             normal);
+    const Vec3 turn = turn_gap(rig, posture, k);
+    add_pair(rig, k, turn_rows(posture.rotations[at(p)], turn),
+             turn - priors.rotation_mean.segment<3>(3 * k),
+             weights.joint * precision(priors.rotation, k), normal);
     if (!priors.stiff_joints)
       add_pair(rig, k, joint_rows(rig, posture, k), joint_gap(rig, posture, k),
-               weights.joint * inverse_square(priors.joint[k]), normal);
+               Vec3::Constant(weights.joint * inverse_square(priors.joint[k])), normal);
   }
   const Index shapes = rig.shapes();
   normal.matrix.bottomRightCorner(shapes, shapes) += weights.blendshape * priors.blend_precision;

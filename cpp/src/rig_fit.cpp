@@ -34,13 +34,13 @@ class Run {
         priors_(complete(rig, priors)), marks_(landmark_rows(rig, landmarks, weights.landmark)),
         state_(std::make_unique<SkinState>(rig, start)) {}
 
-  RigFitResult through(const std::vector<RigStage>& stages, bool matrices) {
+  RigFitResult through(const std::vector<RigStage>& stages, RigReport what) {
     for (const RigStage& stage : stages) {
       const double begun = now();
       result_.iterations.push_back(settle(stage));
       result_.stage_seconds.push_back(now() - begun);
     }
-    report(stages.back(), matrices);
+    report(stages.back(), what);
     return std::move(result_);
   }
 
@@ -107,6 +107,8 @@ class Run {
     normal_.matrix.setZero(n, n);
     normal_.gradient.setZero(n);
     sums_.add(pairs_.rows, *state_, normal_, of);
+    whole_ = of == Unknowns::All;
+    if (whole_) data_ = normal_.matrix;
     if (!marks_.empty()) sums_.add(marks_, *state_, normal_, of);
     add_priors(rig_, state_->posture, weights_, priors_, normal_);
   }
@@ -134,16 +136,18 @@ class Run {
     return free_step(rig_, *state_, priors_, moves, normal_, damping, step);
   }
 
-  /// Matrices are of the rows that the last iteration used, whose weights stand for all; pairs and
-  /// what they say are those of all points.
-  void report(RigStage stage, bool matrices) {
-    if (matrices) report_matrices();
-    stage.every_point = stage.every_vertex = 1;
+  /// Matrices are those that the last step was taken from; pairs and what they say are of all
+  /// points, unless only a lead to the next fit is wanted.
+  void report(RigStage stage, RigReport what) {
+    if (what == RigReport::Whole) report_matrices();
+    if (what != RigReport::Lead) stage.every_point = stage.every_vertex = 1;
     matcher_.match(*state_, stage, weights_, priors_, pairs_);
     need_pairs(stage);
+    result_.every_point = std::max(1, stage.every_point);
     result_.posture = state_->posture;
+    result_.points = state_->points;
     result_.terms = terms();
-    report_spread();
+    if (what != RigReport::Lead) report_spread();
     report_pairs();
   }
 
@@ -155,18 +159,15 @@ class Run {
   }
 
   void report_matrices() {
-    const Index n = rig_.unknowns();
-    Normal data{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
-    Normal prior = data;
-    sums_.add(pairs_.rows, *state_, data);
-    sums_.add(marks_, *state_, prior);
-    add_priors(rig_, state_->posture, weights_, priors_, prior);
-    result_.data_matrix = data.matrix.selfadjointView<Eigen::Lower>();
-    result_.prior_matrix = prior.matrix.selfadjointView<Eigen::Lower>();
+    if (!whole_) assemble(); // of bones alone
+    result_.data_matrix = data_.selfadjointView<Eigen::Lower>();
+    normal_.matrix -= data_;
+    result_.prior_matrix = normal_.matrix.selfadjointView<Eigen::Lower>();
   }
 
   void report_spread() {
     std::vector<double> residuals;
+    residuals.reserve(pairs_.rows.size());
     for (const Row& row : pairs_.rows)
       residuals.push_back(row.residual(state_->points));
     result_.residual_sd = robust_sd(std::move(residuals));
@@ -199,6 +200,8 @@ class Run {
   std::unique_ptr<SkinState> state_;
   Pairs pairs_;
   Normal normal_;
+  Eigen::MatrixXd data_; ///< the data's part of the last `normal_`
+  bool whole_ = false;   ///< that was by all unknowns
   RigFitResult result_;
 };
 
@@ -268,7 +271,7 @@ RigOffset RigFit::offset(const Points& skin, const RigOffsetSettings& settings) 
 
 RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                          const RigPriors& priors, const std::vector<RigStage>& stages,
-                         const RigLandmarks& landmarks, bool matrices) {
+                         const RigLandmarks& landmarks, RigReport report) {
   check_ready(start);
   for (const RigStage& stage : stages)
     if (stage.iterations < 1)
@@ -276,7 +279,7 @@ RigFitResult RigFit::run(const RigPosture& start, const RigWeights& weights,
                        std::to_string(stage.iterations) + "; leave the stage out");
   if (stages.empty()) throw ShapeError("stages must be one at least, got none; give a schedule");
   Run run(*state_->rig, state_->matcher, state_->sums, weights, priors, landmarks, start);
-  return run.through(stages, matrices);
+  return run.through(stages, report);
 }
 
 } // namespace supple

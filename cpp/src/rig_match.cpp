@@ -10,6 +10,8 @@ namespace {
 using Vec3 = Eigen::Vector3d;
 using Index = Eigen::Index;
 constexpr double kDegree = 0.017453292519943295;
+/// Of so many vertices, one is held against sliding for all.
+constexpr std::size_t kSlide = 4;
 
 /// Mean of the two normals, so that the residual vanishes for any two points of one sphere: the
 /// curvature of a surface is no residual. Zero where the normals contradict each other.
@@ -34,6 +36,7 @@ void Matcher::set_scan(const ScanCloud& scan) {
   scan_ = &scan;
   tree_ = PointTree(scan.points);
   hint_.assign(static_cast<std::size_t>(scan.points.rows()), -1);
+  landed_at_.resize(0, 3);
 }
 
 void Matcher::turn_normals(const Points& points) {
@@ -61,7 +64,7 @@ void Matcher::match(const SkinState& state, const RigStage& stage, const RigWeig
   pairs.area = 0.0;
   const double patch = priors.patch * priors.noise;
   const double weight = weights.data / (patch * patch);
-  from_scan(stage, weight * (1.0 - stage.template_share), pairs);
+  from_scan(state.points, stage, weight * (1.0 - stage.template_share), pairs);
   from_template(state, stage, weight * stage.template_share, pairs);
 }
 
@@ -82,35 +85,46 @@ std::vector<Landing> Matcher::land(const Points& vertices, const Points& points)
 }
 
 std::vector<Landing> Matcher::land_scan(const Points& vertices, double reach) {
-  skin_.refit(vertices);
-  std::vector<Landing> landed(hint_.size());
-#pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < landed.size(); ++i) {
-    landed[i] =
-        skin_.closest(scan_->points.row(static_cast<Index>(i)).transpose(), reach, hint_[i]);
-    if (landed[i].leaf >= 0) hint_[i] = landed[i].leaf;
+  const bool known = landed_at_.rows() == vertices.rows() && landed_at_ == vertices;
+  if (!known || landed_reach_ < reach) {
+    skin_.refit(vertices);
+    land_each(reach, 1);
+    landed_at_ = vertices;
   }
+  std::vector<Landing> landed = landed_;
+  for (Landing& one : landed)
+    if (one.squared >= reach * reach) one.triangle = -1;
   return landed;
 }
 
-void Matcher::from_scan(const RigStage& stage, double weight, Pairs& pairs) {
+/// Every so many of the scan's points on the skin, as it was refitted.
+void Matcher::land_each(double reach, std::size_t every) {
+  landed_.resize((hint_.size() + every - 1) / every);
+  landed_reach_ = reach;
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < landed_.size(); ++i) {
+    int& hint = hint_[i * every];
+    landed_[i] =
+        skin_.closest(scan_->points.row(static_cast<Index>(i * every)).transpose(), reach, hint);
+    if (landed_[i].leaf >= 0) hint = landed_[i].leaf;
+  }
+}
+
+void Matcher::from_scan(const Points& vertices, const RigStage& stage, double weight,
+                        Pairs& pairs) {
   const Index all = scan_->points.rows(), every = std::max(1, stage.every_point);
   pairs.triangle.setConstant(all, -1);
   pairs.barycentric.setZero(all, 3);
   pairs.distance.setConstant(all, std::numeric_limits<double>::quiet_NaN());
   pairs.row_of.assign(static_cast<std::size_t>(all), -1);
-  std::vector<Landing> landed(static_cast<std::size_t>((all + every - 1) / every));
-#pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < landed.size(); ++i) {
-    const Index p = static_cast<Index>(i) * every;
-    int& hint = hint_[static_cast<std::size_t>(p)];
-    landed[i] = skin_.closest(scan_->points.row(p).transpose(), stage.reach, hint);
-    if (landed[i].leaf >= 0) hint = landed[i].leaf;
-  }
-  for (std::size_t i = 0; i < landed.size(); ++i)
-    if (landed[i].triangle >= 0)
+  land_each(stage.reach, static_cast<std::size_t>(every));
+  landed_at_.resize(0, 3);
+  if (every == 1) landed_at_ = vertices;
+  pairs.rows.reserve(landed_.size() + static_cast<std::size_t>(rig_.vertices()));
+  for (std::size_t i = 0; i < landed_.size(); ++i)
+    if (landed_[i].triangle >= 0)
       add_landing(stage, weight * static_cast<double>(every), static_cast<Index>(i) * every,
-                  landed[i], pairs);
+                  landed_[i], pairs);
 }
 
 /// A row, unless the point lands at the template's border or sees its other side.
@@ -176,9 +190,9 @@ void Matcher::from_template(const SkinState& state, const RigStage& stage, doubl
     row.loss = stage.loss;
     pairs.vertex_row[static_cast<std::size_t>(v)] = static_cast<int>(pairs.rows.size());
     pairs.rows.push_back(row);
-    if (!(stage.point_share > 0.0)) continue;
+    if (!(stage.point_share > 0.0) || i % kSlide != 0) continue;
     const Vec3 tangent = row.direction.unitOrthogonal();
-    row.weight *= stage.point_share;
+    row.weight *= stage.point_share * kSlide;
     for (const Vec3& along : {tangent, Vec3(row.direction.cross(tangent))}) {
       row.direction = along;
       pairs.rows.push_back(row);

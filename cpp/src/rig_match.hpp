@@ -36,7 +36,8 @@ class Matcher {
              const RigPriors& priors, Pairs& pairs);
 
  private:
-  void from_scan(const RigStage& stage, double weight, Pairs& pairs);
+  void from_scan(const Points& vertices, const RigStage& stage, double weight, Pairs& pairs);
+  void land_each(double reach, std::size_t every);
   void add_landing(const RigStage& stage, double weight, Eigen::Index p, const Landing& at,
                    Pairs& pairs);
   void from_template(const SkinState& state, const RigStage& stage, double weight, Pairs& pairs);
@@ -49,6 +50,9 @@ class Matcher {
   std::vector<int> vertex_order_; ///< neighbours near each other
   Points normals_;                ///< (n, 3) of the posed template, unit
   Eigen::VectorXd areas_;         ///< (n) m², a third of the triangles around
+  std::vector<Landing> landed_;   ///< where each of the scan's points landed last, within
+  double landed_reach_ = 0.0;     ///< that many m,
+  Points landed_at_;              ///< (n, 3) on this skin; empty: not all of them
   std::vector<int> hint_;         ///< (c) leaf of the skin's tree where each point landed last
 };
 

@@ -27,6 +27,7 @@ SkinTree::SkinTree(const Points& points, const Triangles& triangles)
     : triangles_(triangles), order_(static_cast<std::size_t>(triangles.rows())) {
   std::iota(order_.begin(), order_.end(), 0);
   build(points, 0, static_cast<int>(order_.size()));
+  widen(0);
   refit(points);
 }
 
@@ -67,6 +68,40 @@ void SkinTree::build(const Points& points, int begin, int end) {
   build(points, begin, middle);
   nodes_[self].right = static_cast<int>(nodes_.size());
   build(points, middle, end);
+}
+
+/// The wide node of a node and the two levels below it.
+int SkinTree::widen(int node) {
+  std::vector<int> below{node};
+  for (int level = 0; level < 3; ++level) {
+    std::vector<int> next;
+    for (const int n : below) {
+      next.push_back(nodes_[static_cast<std::size_t>(n)].leaf < 0 ? n + 1 : n);
+      if (nodes_[static_cast<std::size_t>(n)].leaf < 0)
+        next.push_back(nodes_[static_cast<std::size_t>(n)].right);
+    }
+    below.swap(next);
+  }
+  const std::size_t self = wide_.size();
+  wide_.emplace_back();
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const int n = k < below.size() ? below[k] : -1;
+    const int leaf = n < 0 ? -1 : nodes_[static_cast<std::size_t>(n)].leaf;
+    const int child = n < 0 || leaf >= 0 ? ~leaf : widen(n);
+    wide_[self].node[k] = n;
+    wide_[self].child[k] = child;
+  }
+  return static_cast<int>(self);
+}
+
+void SkinTree::fill(Wide& wide) const {
+  const double far = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kLanes; ++k)
+    for (int d = 0; d < 3; ++d) {
+      const int n = wide.node[k];
+      wide.low[d][k] = n < 0 ? far : nodes_[static_cast<std::size_t>(n)].box.low[d];
+      wide.high[d][k] = n < 0 ? -far : nodes_[static_cast<std::size_t>(n)].box.high[d];
+    }
 }
 
 void SkinTree::fill(const Points& points, Leaf& leaf) const {
@@ -118,39 +153,49 @@ void SkinTree::refit(const Points& points) {
         }
     }
   }
+  for (Wide& wide : wide_)
+    fill(wide);
 }
 
-double SkinTree::Box::squared_distance(const Vec3& q) const {
-  double sum = 0.0;
+SkinTree::Lanes SkinTree::Wide::squared_distance(const Vec3& q) const {
+  Lanes sum{};
   for (int d = 0; d < 3; ++d) {
-    const double outside = std::max(std::max(low[d] - q[d], q[d] - high[d]), 0.0);
+    const Lanes below = low[d] - q[d], above = q[d] - high[d];
+    Lanes outside = below > above ? below : above;
+    outside = outside > 0.0 ? outside : Lanes{};
     sum += outside * outside;
   }
   return sum;
 }
 
 Landing SkinTree::closest(const Vec3& q, double reach, int hint) const {
+  struct Entry {
+    double squared;
+    int child;
+  };
   Landing best;
   best.squared = reach * reach;
   if (hint >= 0) visit(q, hint, best);
-  std::array<std::pair<double, int>, 64> stack;
+  std::array<Entry, 12 * kLanes> stack; // of 2³¹ triangles at most, ten wide nodes deep
   std::size_t top = 0;
-  stack[top++] = {nodes_[0].box.squared_distance(q), 0};
+  stack[top++] = {0.0, 0};
   while (top > 0) {
-    const auto [distance, number] = stack[--top];
-    if (distance >= best.squared) continue;
-    const Node& node = nodes_[static_cast<std::size_t>(number)];
-    if (node.leaf >= 0) {
-      if (node.leaf != hint) visit(q, node.leaf, best);
+    const Entry entry = stack[--top];
+    if (entry.squared >= best.squared) continue;
+    if (entry.child < 0) {
+      if (~entry.child != hint) visit(q, ~entry.child, best);
       continue;
     }
-    std::pair<double, int> near{
-        nodes_[static_cast<std::size_t>(number + 1)].box.squared_distance(q), number + 1};
-    std::pair<double, int> far{nodes_[static_cast<std::size_t>(node.right)].box.squared_distance(q),
-                               node.right};
-    if (far.first < near.first) std::swap(near, far);
-    if (far.first < best.squared) stack[top++] = far;
-    if (near.first < best.squared) stack[top++] = near;
+    const Wide& wide = wide_[static_cast<std::size_t>(entry.child)];
+    const Lanes squared = wide.squared_distance(q);
+    const std::size_t from = top;
+    for (int k = 0; k < kLanes; ++k) {
+      if (!(squared[k] < best.squared)) continue;
+      std::size_t at = top++; // the nearest on top
+      for (; at > from && stack[at - 1].squared < squared[k]; --at)
+        stack[at] = stack[at - 1];
+      stack[at] = {squared[k], wide.child[k]};
+    }
   }
   return best;
 }

@@ -41,21 +41,30 @@ class SkinTree {
   };
   struct Box {
     double low[3], high[3];
-    double squared_distance(const Eigen::Vector3d& q) const;
   };
   struct Node {
     Box box;
     int right = -1; ///< the left child follows its parent
     int leaf = -1;
   };
+  /// Three levels of nodes in one, whose boxes are measured at once; lanes that are left are empty.
+  struct Wide {
+    Lanes low[3], high[3];
+    int node[kLanes];  ///< whose box a lane has, −1
+    int child[kLanes]; ///< a wide node, or ~leaf
+    Lanes squared_distance(const Eigen::Vector3d& q) const;
+  };
 
   void build(const Points& points, int begin, int end);
+  int widen(int node);
   void fill(const Points& points, Leaf& leaf) const;
+  void fill(Wide& wide) const;
   void visit(const Eigen::Vector3d& q, int leaf, Landing& best) const;
 
   Triangles triangles_;
   std::vector<int> order_;
   std::vector<Node> nodes_;
+  std::vector<Wide> wide_;
   std::vector<Leaf> leaves_;
 };
 

@@ -6,8 +6,14 @@
 #include "supple/error.hpp"
 #include "supple/pardiso.hpp"
 #include "supple/system.hpp"
+#include "symmetric_product.hpp"
 
 namespace supple {
+namespace {
+
+constexpr int kMostProbes = 30; // as long as about half of LDLᵀ at 10,000 unknowns
+
+} // namespace
 
 void System::forget_factors() {
   factor_.reset();
@@ -121,6 +127,24 @@ Definite System::find_definite() {
   }
   if (definite() == Definite::Unknown) factorise();
   return definite();
+}
+
+bool System::definite_beside(const System& inverse) {
+  if (kind() != Kind::Cholesky || !inverse.inverse_ || !inverse.reduction_) return false;
+  const std::shared_ptr<Factor> factor = inverse.inverse_->definite_factor();
+  if (!factor || !(inverse.reduction_->pattern == reduction().pattern)) return false;
+  const Stopwatch watch(timings.solve);
+  const SymmetricProduct product(reduction().pattern);
+  const Vector& values = reduced_tangent();
+  const auto matrix = [&](const Vector& in, Vector& out) { product.apply(values, in, out); };
+  const auto preconditioner = [&](const Vector& in, Vector& out) {
+    factor->apply_inverse(in, out);
+  };
+  Vector x = Vector::Zero(reduction().free());
+  const CgReport report = conjugate_gradients(matrix, preconditioner, Vector::Ones(x.size()), x,
+                                              {1.0, kMostProbes, true, nullptr});
+  timings.krylov_iterations += report.iterations;
+  return report.definite == Definite::Yes;
 }
 
 /// By conjugate gradients; by LDLᵀ where those led to a new factor that the tangent does not have.

@@ -29,7 +29,9 @@ def metres(unit: str) -> float:
 
 
 def existing(path: Path) -> Path:
-    """The same path; InputError if no file is there, or an empty one."""
+    """The same path; InputError if no file is there, but a folder or nothing, or an empty one."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder, not a file; name the file in it.")
     if not path.is_file():
         raise InputError(f"no file at {path}; check the path.")
     if path.stat().st_size == 0:

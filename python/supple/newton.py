@@ -137,15 +137,19 @@ def as_dict(iteration: Any) -> dict[str, float]:
     return {name: getattr(iteration, name) for name in _FIELDS}
 
 
-def unstable_directions(body: Body, u: Floats) -> int:
-    """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it."""
+def unstable_directions(body: Body, u: Floats, inverse: Any = None) -> int:
+    """In which the body buckles at unknowns ``u``; 0 where a load without energy hides it.
+
+    Args:
+        inverse: the system of the inverse form that led to ``u``; what it keeps spares a factor.
+    """
     if body._description.pressures:  # which have none: nothing needs to be built
         return 0
     system = assembly.system(body).system
     if not system.has_energy():
         return 0
     system.set_free(np.append(~body._fixed.ravel(), np.ones(system.scalars, bool)))
-    return int(system.unstable_directions(u))
+    return int(system.unstable_directions(u, inverse))
 
 
 def _is_stressed(body: Body) -> bool:

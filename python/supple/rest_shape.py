@@ -94,7 +94,13 @@ def _solved(body: Body, asked: Request, start: Rest | None) -> Rest:
         smooth = not body._description.has_kinks  # at which inexact steps lose the way
         gmres = asked.solver == "gmres" or (asked.solver == "auto" and smooth)
         result, built = newton.run(
-            body, asked.settings, begin, True, asked.density_of, gmres, Judge(body)
+            body,
+            asked.settings,
+            begin,
+            True,
+            asked.density_of,
+            gmres,
+            Judge(body, asked.density_of),
         )
     else:
         result, built = newton.run(body._reversed(), asked.settings, begin)
@@ -117,9 +123,11 @@ class Judge:
 
     Args:
         body: on the given shape.
+        density_of: of the inverse form that is solved, as in `Body.rest_shape`.
     """
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: Body, density_of: str = "rest") -> None:
+        self._given, self._form = body, (True, density_of)
         self._body = body.on(body.mesh)
         self._body._built = body._judging
 
@@ -132,7 +140,8 @@ class Judge:
         assembly.system(self._body).system.move_points(points.ravel())
         loaded = found.copy()
         loaded[: mesh.points.size] *= -1
-        unstable = newton.unstable_directions(self._body, loaded)
+        inverse = self._given._built[self._form].system
+        unstable = newton.unstable_directions(self._body, loaded, inverse)
         return outcome.unstable if unstable else outcome.converged
 
 

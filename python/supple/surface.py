@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -78,12 +79,24 @@ class Surface:
         check_unit(float(np.ptp(points, axis=0).max()), unit, file)
         return cls(points * scale, triangles)
 
-    def write(self, path: str | Path, unit: str = "mm", frame: str = "LPS") -> Path:
-        """Write a binary PLY file, whole or not at all; its header names ``unit`` and ``frame``."""
+    def write(
+        self, path: str | Path, unit: str = "mm", frame: str = "LPS",
+        values: Mapping[str, npt.ArrayLike] | None = None,
+    ) -> Path:  # fmt: skip
+        """Write a binary PLY file, whole or not at all; its header names ``unit`` and ``frame``.
+
+        Args:
+            values: name → (n,) a number of each point, written as they are: a scalar property.
+        """
         file = Path(path)
         if file.suffix.lower() != ".ply":
             raise InputError(f"path must end in .ply, got {file.name!r}.")
-        header, body = _ply(self, metres(unit), (f"unit {unit}", f"frame {frame}"))
+        own = {name: np.asarray(one, dtype=np.float64) for name, one in (values or {}).items()}
+        for name, one in own.items():
+            if one.shape != (len(self.points),) or not name.isidentifier():
+                raise InputError(f"values must be ({len(self.points)},) under a plain name, got "
+                                 f"{one.shape} under {name!r}.")  # fmt: skip
+        header, body = _ply(self, metres(unit), (f"unit {unit}", f"frame {frame}"), own)
         with replacing(file) as aside:
             aside.write_bytes(header + body)
         return file
@@ -91,7 +104,7 @@ class Surface:
     @property
     def size(self) -> float:
         """Largest extent along an axis, m."""
-        return float(np.ptp(self.points, axis=0).max())
+        return max(float(np.ptp(self.points[:, axis])) for axis in range(3))
 
     @property
     def areas(self) -> Floats:
@@ -155,18 +168,21 @@ def flat(points: Floats, triangles: Ints) -> npt.NDArray[np.bool_]:
     return np.asarray(np.linalg.norm(_cross(points, triangles), axis=1) <= 1e-12 * longest)
 
 
-def _ply(surface: Surface, scale: float, comments: tuple[str, ...]) -> tuple[bytes, bytes]:
+def _ply(
+    surface: Surface, scale: float, comments: tuple[str, ...], values: Mapping[str, Floats]
+) -> tuple[bytes, bytes]:
     """Header and body of a little-endian PLY file in units of ``scale`` metres."""
     lines = [
         "ply",
         "format binary_little_endian 1.0",
         *(f"comment {comment}" for comment in comments),
         f"element vertex {len(surface.points)}",
-        *(f"property double {axis}" for axis in "xyz"),
+        *(f"property double {name}" for name in (*"xyz", *values)),
     ]
     faces = np.zeros(len(surface.triangles), dtype=[("n", "u1"), ("ids", "<i4", 3)])
     faces["n"], faces["ids"] = 3, surface.triangles
     if len(faces):
         lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
     header = "\n".join([*lines, "end_header", ""]).encode("ascii")
-    return header, (surface.points / scale).astype("<f8").tobytes() + faces.tobytes()
+    points = np.column_stack([surface.points / scale, *values.values()])
+    return header, points.astype("<f8").tobytes() + faces.tobytes()

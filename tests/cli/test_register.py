@@ -119,9 +119,14 @@ def test_landmarks_lie_on_the_scan_near_the_truth(written: Path, scan: Synthetic
     assert np.median(far) < 5e-3
 
 
-def test_the_registered_mesh_is_where_the_skin_is(written: Path, scan: SyntheticScan) -> None:
+def test_the_registered_mesh_is_where_the_skin_is_and_holds_its_sd(
+    written: Path, scan: SyntheticScan, truth: Callable[..., Any]
+) -> None:
     mesh = trimesh.load(written / "registered.ply", process=False)
     assert np.abs(mesh.vertices - 1e3 * scan.truth.vertices).max() < 1e-6
+    sd = mesh.metadata["_ply_raw"]["vertex"]["data"]["sd"]
+    assert (sd > 0).all()
+    assert sd.mean() == pytest.approx(1e3 * np.mean(truth(True)(mesh, torso()).sd), rel=1e-9)
     posture = read_posture(written / "parameters.json", torso())
     assert np.abs(posed(torso(), posture) - scan.truth.vertices).max() < 1e-12
 
@@ -162,7 +167,13 @@ def test_a_fit_that_is_not_trustworthy_is_written_marked_and_exits_with_3(
 ) -> None:  # fmt: skip
     monkeypatch.setattr(register_module, "register", truth(False))
     assert run(files, tmp_path / "out") == 3
-    assert "not trustworthy: Only a <third>" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert "not trustworthy: Only a <third>" in printed.err
+    assert "Only a <third>" not in printed.out
+    assert re.search(
+        r"fitted in 0\.10 s, \d+\.\d s with reading, measuring and writing", printed.out
+    )
+    assert re.search(r"body: \d\d cm around .*; the scan was read in mm", printed.out)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "Do not rely on this result" in page
     assert "Only a &lt;third&gt; of the scan is explained." in page
@@ -175,7 +186,10 @@ def test_a_fit_that_is_not_trustworthy_is_written_marked_and_exits_with_3(
     [
         (["nowhere.ply"], "no file at nowhere.ply"),
         (["{scan}", "--template", "nowhere.glb"], "no file at nowhere.glb"),
-        (["{scan}", "--template", "{scan}"], r"\.glb"),
+        (["{folder}"], "is a folder, not a file; name the file in it"),
+        (["{scan}", "--template", "{scan}"], r"a template's file must end in \.glb .*scan\.ply"),
+        (["{scan}", "--template", "{folder}"], r"a template's file must end in \.glb"),
+        (["{scan}", "--unit", "m"], "give --unit mm"),
         (["{scan}", "--landmarks", "nowhere.fcsv"], "no file at nowhere.fcsv"),
         (["{scan}", "--landmarks", "{bad}"], "nippel"),
         (["{scan}", "--landmarks", "{far}"], "must lie on the scan"),
@@ -195,7 +209,12 @@ def test_bad_input_is_refused_before_the_fit_and_leaves_nothing(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.csv").write_text("name,x,y,z\nnippel,1,2,3\n")
     write_landmarks(tmp_path / "far.csv", {"xiphoid": [30, -45, 52], "nipple_left": [30, -45, 60]})
-    names = {"scan": files / "scan.ply", "bad": tmp_path / "bad.csv", "far": tmp_path / "far.csv"}
+    names = {
+        "scan": files / "scan.ply",
+        "bad": tmp_path / "bad.csv",
+        "far": tmp_path / "far.csv",
+        "folder": files,
+    }
     before = sorted(tmp_path.iterdir())
     assert main(["register", *(a.format(**names) for a in arguments)]) == 2
     assert re.search(match, capsys.readouterr().err)

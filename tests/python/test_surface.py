@@ -35,6 +35,19 @@ def test_ply_round_trip_in_any_unit_names_unit_and_frame(tmp_path, unit):
     assert [p.name for p in tmp_path.iterdir()] == ["s.ply"]
 
 
+def test_values_of_points_are_a_scalar_property_in_the_file(tmp_path):
+    """Read back by trimesh, to the last bit; the surface reads as it does without them."""
+    trimesh = pytest.importorskip("trimesh")
+    surface = Surface(POINTS, TRIANGLES)
+    sd = [0.1, 2.0, np.pi, 4.0]
+    file = surface.write(tmp_path / "s.ply", values={"sd": sd})
+    kept = trimesh.load(file, process=False).metadata["_ply_raw"]["vertex"]["data"]
+    assert kept["sd"].ravel().tolist() == sd
+    np.testing.assert_allclose(Surface.read(file).points, surface.points, atol=1e-15)
+    with pytest.raises(InputError, match=r"values must be \(4,\)"):
+        surface.write(tmp_path / "t.ply", values={"sd": sd[:3]})
+
+
 def test_ascii_files_of_each_format_are_the_same_surface(tmp_path):
     """A triangle pair as OBJ (texture seams, one quadrilateral), OFF, STL, PLY with extra data."""
     obj = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,8 @@ def test_the_spread_of_vertices_is_that_of_the_jacobian(rig: Rig, template: Temp
 def prior_energy(template: Template, posture: Posture, priors: Priors) -> dict[str, Any]:
     """Each term of the energy by NumPy, also for complex numbers."""
     R, s, parents = posture.rotations, posture.scales, template.parents
-    scale = [(s[k] - (s[p] if p >= 0 else 1)) / priors.scale[k] for k, p in enumerate(parents)]
+    above = [s[p] if p >= 0 else np.ones(3) for p in parents]
+    scale = (s - np.array(above) - priors.scale_mean) / priors.scale
     at_joint, turns = [], []
     for k, p in enumerate(parents):
         if p < 0:
@@ -114,11 +116,11 @@ def prior_energy(template: Template, posture: Posture, priors: Priors) -> dict[s
         arm = template.joints[k] - template.joints[p]
         carried = R[p] @ (s[p] * arm) + template.joints[p] + posture.translations[p]
         at_joint.append((template.joints[k] + posture.translations[k] - carried) / priors.joint[k])
-        relative = R[k] @ R[p].T
+        relative = R[p].T @ R[k]
         angle = np.arccos((np.trace(relative) - 1) / 2)
         odd = relative - relative.T
         axis = np.array([odd[2, 1], odd[0, 2], odd[1, 0]]) / (2 * np.sin(angle))
-        turns.append(angle * axis / priors.rotation[k])
+        turns.append((angle * axis - priors.rotation_mean[k]) / priors.rotation[k])
     offset = posture.blend - priors.blend_mean
     return {
         "scale": 0.5 * np.sum(np.square(scale)), "joint": 0.5 * np.sum(np.square(at_joint)),
@@ -142,8 +144,9 @@ def priors(template: Template) -> Priors:
     bones, shapes = len(template.bones), len(template.blendshapes)
     root = rng.standard_normal((shapes, shapes))
     return Priors(
-        scale=rng.uniform(0.05, 0.2, bones), joint=rng.uniform(1e-3, 5e-3, bones),
-        rotation=rng.uniform(0.2, 0.8, bones), blend_mean=rng.standard_normal(shapes),
+        scale=rng.uniform(0.05, 0.2, (bones, 3)), joint=rng.uniform(1e-3, 5e-3, bones),
+        scale_mean=rng.normal(0.0, 0.1, (bones, 3)), rotation=rng.uniform(0.2, 0.8, (bones, 3)),
+        rotation_mean=rng.normal(0.0, 0.3, (bones, 3)), blend_mean=rng.standard_normal(shapes),
         blend_covariance=root @ root.T + np.eye(shapes),
     )  # fmt: skip
 
@@ -207,3 +210,25 @@ def test_the_matrix_is_that_of_the_rows_and_of_priors_that_are_convex(
 ) -> None:
     """What JᵀWJ by the dense Jacobian leaves of it is positive semidefinite, as priors are."""
     assert quadratic_gap(rig, template, evaluation) > -1e-13
+
+
+def test_one_deviation_of_a_bone_is_that_of_its_three_axes(
+    rig: Rig, template: Template, priors: Priors
+) -> None:
+    """(K,) deviations without means cost what the same ones repeated (K, 3), with means 0, do."""
+    posture, zero = some_posture(template, 8), np.zeros((len(template.bones), 3))
+    one = replace(priors, scale=priors.scale[:, 0], scale_mean=None,
+                  rotation=priors.rotation[:, 0], rotation_mean=None)  # fmt: skip
+    three = replace(priors, scale=priors.scale[:, :1] + zero, scale_mean=zero,
+                    rotation=priors.rotation[:, :1] + zero, rotation_mean=zero)  # fmt: skip
+    rig.set_scan(Surface(template.points, template.triangles), thin=False)
+    found = [
+        rig._fit.evaluate(
+            _arrays(Posture.rest(template)), _arrays(posture), weights_in_core(Weights()),
+            priors_in_core(some, template), stage_in_core(Stage(reach=0.1)),
+            *rig._landmarks({}, 5e-3),
+        ) for some in (one, three)
+    ]  # fmt: skip
+    assert found[0].terms.scale == found[1].terms.scale > 0
+    assert found[0].terms.rotation == found[1].terms.rotation > 0
+    assert np.array_equal(found[0].gradient, found[1].gradient)

@@ -77,11 +77,19 @@ def test_a_unit_that_the_size_contradicts_is_refused(tmp_path):
         read_scan(ply(tmp_path / "c.ply", points * 1e-3, triangles))
 
 
+def test_a_part_of_a_torso_is_asked_for_more(tmp_path):
+    """0.1 m in the unit that its comment names: more of the body is what lacks, not a unit."""
+    points, triangles = body()
+    file = ply(tmp_path / "s.ply", points * 200, triangles, ["unit mm"])
+    with pytest.raises(InputError, match=r"spans 100 mm .*; scan the front .*in cm \(1.00 m\)"):
+        read_scan(file)
+
+
 def test_inches_are_asked_for_never_guessed(tmp_path):
     """A torso of 0.5 m is 19.7 in, which may be 19.7 cm."""
     points, triangles = body()
     file = ply(tmp_path / "s.ply", points / 0.0254, triangles)
-    with pytest.raises(InputError, match="unit='cm' or unit='in'"):
+    with pytest.raises(InputError, match=r"--unit cm .*or --unit in"):
         read_scan(file)
     np.testing.assert_allclose(read_scan(file, unit="in").surface.points, points, atol=1e-12)
 

@@ -1,11 +1,12 @@
 /// Solves with the tangents of an inverse form, one after the other, on few factorisations.
 ///
 ///     A = K D, D = −F⁻¹ at the nodes       near to symmetric, and to the A of other rest shapes
-///     LDLᵀ of (A + Aᵀ)/2 at one of them    at the loaded shape itself it is the direct tangent
+///     L Lᵀ of (A + Aᵀ)/2 at one of them    at the loaded shape itself it is the direct tangent
 ///     GMRES on A preconditioned by it      5 iterations for 2 digits, 20 for 8, at 30 % strain
 ///
-/// A new factor where the iterations cost more than it; LU of A where GMRES does not get there even
-/// so: it fails where LU fails and nowhere else.
+/// A new factor where the iterations cost more than it; LDLᵀ where it is not positive definite or
+/// wants double precision, and LU of A where GMRES does not get there even so: it fails where LU
+/// fails and nowhere else.
 #pragma once
 
 #include <memory>
@@ -37,14 +38,18 @@ class InverseSolver {
   /// is singular. Both (free).
   bool solve(const Vector& rhs, double tolerance, Vector& x);
 
+  /// The factor that is kept, if it is L Lᵀ: a preconditioner for tangents near it; else nothing.
+  std::shared_ptr<Factor> definite_factor() const;
+
   /// Let go of the factor that is kept, so that results do not depend on what was solved before.
-  void forget() { kept_ = nullptr; }
+  void forget();
 
   SolverWork work;
 
  private:
   FactorStatus factorise();
   FactorStatus factorise_lu();
+  FactorStatus keep_symmetric(Factor& factor);
   FactorStatus keep(Factor& factor);
   bool iterate(const Vector& rhs, double tolerance, Vector& y);
   Vector moved(const Vector& y) const;
@@ -56,7 +61,9 @@ class InverseSolver {
   std::unique_ptr<Relabelling> relabelling_;
   std::vector<Index> mirror_;
   std::unique_ptr<Reduction> full_; // for LU, made when it is first needed
-  Factor symmetric_{Kind::QuasiDefinite}, lu_{Kind::Unsymmetric};
+  std::shared_ptr<Factor> light_ = std::make_shared<Factor>(Kind::Cholesky, Precision::Single);
+  bool light_serves_;
+  Factor exact_{Kind::QuasiDefinite}, lu_{Kind::Unsymmetric};
   Factor* kept_ = nullptr; // that preconditions
   bool fresh_ = false;     // it is of the tangent at hand
   bool worn_ = false;      // a new one would have cost less

@@ -14,12 +14,12 @@ namespace supple {
 
 struct GmresSettings {
   double tolerance = 1e-10; ///< ‖b − Ax‖₂ ≤ tolerance·‖b‖₂
-  int max_iterations = 50;  ///< without restart: so many vectors are kept
+  int max_iterations = 50;  ///< without restart: twice so many vectors are kept
 };
 
 struct GmresReport {
   bool converged = false;
-  int iterations = 0;    ///< applications of the preconditioner, but for the last
+  int iterations = 0;    ///< applications of the preconditioner
   double residual = 0.0; ///< ‖b − Ax‖₂ / ‖b‖₂ as the recurrence has it
 };
 
@@ -29,8 +29,9 @@ using Operator = std::function<void(const Vector& x, Vector& y)>;
 /// Solve A x = b from the guess `x`; x is the best iterate also where it has not converged.
 ///
 /// Gives up before `max_iterations` where the rate of the first ones shows that it would not get
-/// there. Cost: one A and one M⁻¹ an iteration, 4kn operations in the k-th.
-/// Source: Saad (2003), Iterative Methods for Sparse Linear Systems, algorithm 9.5.
+/// there. What M⁻¹ made of each vector is kept, so that it may round as it likes, as a factor in
+/// single precision does. Cost: one A and one M⁻¹ an iteration, 8kn operations in the k-th.
+/// Source: Saad (2003), Iterative Methods for Sparse Linear Systems, algorithm 9.6 (FGMRES).
 /// @throws ShapeError if x and b differ in size.
 GmresReport gmres(const Operator& matrix, const Operator& preconditioner, const Vector& b,
                   Vector& x, const GmresSettings& settings);

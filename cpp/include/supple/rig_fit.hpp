@@ -25,13 +25,16 @@ struct RigPriors {
   /// m: data within patch × patch are one observation, however many points it holds: residuals of
   /// neighbours share their cause (sensor drift, a shape that the template lacks).
   double patch = 15e-3;
-  Eigen::VectorXd scale;       ///< (K) of s_k − s_parent; of the root, of s − 1
-  Eigen::VectorXd joint;       ///< (K) m of T_k(j_k) − T_parent(j_k); the root's is not used
-  Eigen::VectorXd rotation;    ///< (K) rad of a bone against its parent; the root's is not used
-  Eigen::VectorXd blend_mean;  ///< (A)
-  RowMatrix blend_precision;   ///< (A, A) inverse covariance of the blend
-  Eigen::VectorXd blend_lower; ///< (A)
-  Eigen::VectorXd blend_upper; ///< (A)
+  Eigen::VectorXd scale;      ///< (K) or (3K) of s_k − s_parent; of the root, of s − 1
+  Eigen::VectorXd scale_mean; ///< (3K) of the same; 0
+  Eigen::VectorXd joint;      ///< (K) m of T_k(j_k) − T_parent(j_k); the root's is not used
+  /// (K) or (3K) rad of log(R_parentᵀ R_k), along the parent's axes; the root's is not used
+  Eigen::VectorXd rotation;
+  Eigen::VectorXd rotation_mean; ///< (3K) of the same; 0
+  Eigen::VectorXd blend_mean;    ///< (A)
+  RowMatrix blend_precision;     ///< (A, A) inverse covariance of the blend
+  Eigen::VectorXd blend_lower;   ///< (A)
+  Eigen::VectorXd blend_upper;   ///< (A)
   double scale_lower = 0.5, scale_upper = 2.0;
   bool stiff_joints = false; ///< joints hold exactly, by Lagrange multipliers
   bool convex = false;       ///< Σ α = 1, α ≥ 0 (the thesis' blend)
@@ -84,15 +87,21 @@ struct RigTerms {
   double total() const { return data + scale + blendshape + joint + landmark + rotation; }
 };
 
+/// What a fit says at its end: a `Lead` to another fit, pairs of the points that its last stage
+/// used; `Pairs`, those of all points, with what they spread; the `Whole`, matrices too.
+enum class RigReport { Lead, Pairs, Whole };
+
 struct RigFitResult {
   RigPosture posture;
+  Points points;               ///< (n, 3) m: the template's vertices there
+  int every_point = 1;         ///< so many of the thinned scan's were looked at
   bool converged = false;      ///< the last stage ended by tolerance, or flat
   double last_step = 0.0;      ///< m: largest movement of a vertex in the last iteration
   std::vector<int> iterations; ///< of each stage
   std::vector<double> history; ///< energy at the start of each iteration, of its own pairs
   std::vector<double> stage_seconds;
   RigTerms terms;               ///< at the end
-  Eigen::MatrixXd data_matrix;  ///< (9K+A)² Jᵀ W J of the data at the end, λ and sd included
+  Eigen::MatrixXd data_matrix;  ///< (9K+A)² Jᵀ W J of the data at the last step, λ and sd included
   Eigen::MatrixXd prior_matrix; ///< that of all other terms
   double residual_sd = 0.0;     ///< m: robust sd of the data's residuals
   double patch_sd = 0.0;        ///< m: robust sd of the mean residual of a patch
@@ -161,11 +170,10 @@ class RigFit {
   RigOffset offset(const Points& skin, const RigOffsetSettings& settings);
 
   /// From `start` through all stages. Bitwise the same for any number of threads.
-  /// `matrices`: the result's two are filled; a fit that only leads to the next needs none.
   /// @throws StateError without a scan; ShapeError; NumericalError when no pair is within reach.
   RigFitResult run(const RigPosture& start, const RigWeights& weights, const RigPriors& priors,
                    const std::vector<RigStage>& stages, const RigLandmarks& landmarks,
-                   bool matrices = true);
+                   RigReport report = RigReport::Whole);
 
   /// One evaluation with the pairs of `pairs_at`.
   RigEvaluation evaluate(const RigPosture& pairs_at, const RigPosture& at,

@@ -112,6 +112,10 @@ class System {
   /// The same, but find out where it is unknown: by iterations or by a factor, whichever costs
   /// less.
   Definite find_definite();
+  /// Whether conjugate gradients on the factor that `inverse` keeps, the inverse form of the same
+  /// body, show that the tangent last assembled is positive definite. That factor is of the body
+  /// without strain, in the same place. False where it does not serve, or there is none.
+  bool definite_beside(const System& inverse);
   /// (values of K)·x on all dofs, from the tangent last assembled.
   Vector apply(const ConstVector& x);
   /// The step d (dofs) from `u`, its free nodes on arcs: NodeRotations::along_arcs.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,13 +65,14 @@ def register(
         raise InputError("SCAN is missing; give the file of a surface scan, or --study.")
     from ..registration.output import write
 
+    begun = time.perf_counter()
     run.out_or(Path("out") / scan.name.split(".")[0])
     outcome = fitted(run, scan, template, landmarks, unit, start)
     run.progress("measuring")
     run.result |= {"scan": scan.name, **outcome.summary()}
     run.progress("writing")
     write(outcome, run.path)
-    tell(run, outcome)
+    tell(run, outcome, time.perf_counter() - begun)
 
 
 def _only(rule: str, *given: object) -> None:
@@ -84,7 +86,7 @@ def _study(run: Run, samples: int, data: Path | None) -> None:
     run.out_or(Path("out") / "register-study")
     written = torso.run(run.path("torso.csv").parent, samples, data, run.progress)
     run.result["files"] = [path.name for path in written]
-    run.say(f"{samples} bodies a pose; figures and tables of {', '.join(torso.SWEEPS)}")
+    run.say(f"bodies a pose: {samples}; figures and tables of {', '.join(torso.SWEEPS)}")
 
 
 def fitted(
@@ -112,12 +114,12 @@ def fitted(
     found = read_scan(scan, unit)
     said, given = list(found.said), {}
     if marks is not None:
-        checked = check_on_scan(marks, found.surface)
+        checked = check_on_scan(marks, found.surface, torso)
         said, given = [*said, *checked.said], dict(checked.points)
     settings = RegisterSettings()
     fit = work(found.surface, torso, given or None, settings, posture, run.progress)
     weights = asdict(settings.weights) if hasattr(settings, "weights") else {}
-    return Outcome(fit, found.surface, given, scan.name, said, weights)
+    return Outcome(fit, found.surface, given, scan.name, said, weights, found.unit)
 
 
 def chosen(file: Path | None) -> Template:
@@ -131,12 +133,20 @@ def chosen(file: Path | None) -> Template:
     return read_template(file)
 
 
-def tell(run: Run, outcome: Outcome) -> None:
-    """The result as the command's answer; a fit that is not trustworthy makes it doubtful."""
+def tell(run: Run, outcome: Outcome, seconds: float) -> None:
+    """The result as the command's answer; a fit that is not trustworthy makes it doubtful.
+
+    Args:
+        seconds: that the command took, to the last file written.
+    """
+    from ..registration.body_size import body_size
+
     fit, m, of = outcome.registration, outcome.metrics, outcome.measures.of
     for sentence in outcome.said:
         run.say(f"note: {sentence}")
-    line = f"skin: {m.surface_mae_mm:.2f} mm from {100 * m.used_share:.0f} % of the scan on average"
+    unit = f"; the scan was read in {outcome.unit}" if outcome.unit else ""
+    run.say(f"body: {body_size(fit)}{unit}")
+    line = f"skin: {m.surface_mae_mm:.2f} mm on average from {100 * m.used_share:.0f} % of the scan"
     if m.landmark_mae_mm is not None:
         line += f"; landmarks: {m.landmark_mae_mm:.1f} mm"
     run.say(line)
@@ -146,9 +156,13 @@ def tell(run: Run, outcome: Outcome) -> None:
     ))  # fmt: skip
     on = sum(c.on_scan.sum() for c in outcome.curves.values())
     every = sum(len(c.points) for c in outcome.curves.values())
-    run.say(f"drawing: {100 * on / every:.0f} % on the scan, the rest on the registered skin")
-    for warning in fit.warnings:
-        run.say(f"warning: {warning}")
-    run.say(f"{m.seconds:.2f} s; open report.html in a browser")
-    if not fit.trustworthy:
-        run.doubt("; ".join(fit.warnings) or "the fit does not pass its own checks")
+    held = "" if len(outcome.scan.triangles) else "; the scan is points alone, no surface"
+    run.say(f"drawing: {100 * on / every:.0f} % on the scan, the rest on the registered skin{held}")
+    run.say(f"fitted in {m.seconds:.2f} s, {seconds:.1f} s with reading, measuring and writing; "
+            "open report.html in a browser")  # fmt: skip
+    if fit.trustworthy:
+        for warning in fit.warnings:
+            run.say(f"warning: {warning}")
+        return
+    for reason in fit.warnings or ["the fit does not pass its own checks"]:
+        run.doubt(reason)

@@ -24,7 +24,8 @@ def write_page(path: str | Path, package: str, name: str, parts: Mapping[str, st
     """Write a page, whole or not at all.
 
     Args:
-        package: its folder ``templates`` holds NAME.html and NAME.js.
+        package: its folder ``templates`` holds NAME.html and NAME.js, which finds the functions of
+            ``scene.js`` under ``page``.
         parts: what the HTML names ($title …), as HTML; style, script and plotly.js are put in.
     """
     from plotly.offline import get_plotlyjs
@@ -32,7 +33,7 @@ def write_page(path: str | Path, package: str, name: str, parts: Mapping[str, st
     page = Template(text(package, f"templates/{name}.html")).substitute(
         parts,
         style=text("supple.page", "page.css"),
-        script=text(package, f"templates/{name}.js"),
+        script=text("supple.page", "scene.js") + text(package, f"templates/{name}.js"),
         plotly=get_plotlyjs().replace("</script", "<\\/script"),
     )
     with replacing(Path(path)) as aside:

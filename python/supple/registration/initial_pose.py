@@ -17,6 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from supple.core import core
 from supple.registration.pose_presets import PRESETS, Shapes, shapes_of
 from supple.registration.posture import Posture
 from supple.registration.template import Floats, Ints, Template
@@ -76,9 +77,10 @@ def candidates(
         keep.points, keep.steps, keep.kept, keep.reach, strict=True
     ):
         few = order[:count]
-        for _ in range(steps):
-            _step(poses, points[few], normals[few], shapes, oriented, reach, keep)
-        score = _score(poses, points[few], normals[few], shapes, oriented)
+        poses.R, poses.b, poses.a, score = core().descend(
+            shapes.table, points[few], normals[few], oriented, steps, reach, keep.size_sd,
+            poses.R, poses.b, poses.a, poses.shape.astype(np.int32),
+        )  # fmt: skip
         best = _different(poses, shapes, np.argsort(score), kept, keep.apart)
         poses, score = poses.of(best), score[best]
     return [_candidate(poses, i, score[i], shapes, template) for i in range(len(score))]
@@ -98,76 +100,6 @@ def _starts(middle: Floats, shapes: Shapes) -> _Poses:
     shape = np.repeat(np.arange(count), len(turns))
     b = np.median(shapes.points, axis=1)[shape] - R @ middle
     return _Poses(R, b, np.ones(len(R)), shape)
-
-
-def _matched(poses: _Poses, points: Floats, normals: Floats, shapes: Shapes,
-             oriented: bool) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
-    """Scan points in the template's frame, their offsets and normals, and the normals' cosine."""
-    q = poses.a[:, None, None] * (points @ poses.R.transpose(0, 2, 1)) + poses.b[:, None]
-    at = shapes.at(poses.shape, q)
-    rows = poses.shape[:, None], at
-    normal = shapes.normals[rows]
-    cosine = np.einsum("cmi,cmi->cm", normals @ poses.R.transpose(0, 2, 1), normal)
-    known = (normals != 0).any(axis=1)
-    cosine = np.where(known, cosine if oriented else np.abs(cosine), 0.7)
-    return q, shapes.points[rows] - q, normal, cosine
-
-
-def _step(poses: _Poses, points: Floats, normals: Floats, shapes: Shapes, oriented: bool,
-          reach: float, keep: SearchSettings) -> None:  # fmt: skip
-    """One damped Gauss–Newton step of turn, shift and size for each candidate, in place."""
-    q, offset, normal, cosine = _matched(poses, points, normals, shapes, oriented)
-    square = np.einsum("cmi,cmi->cm", offset, offset)
-    weight = np.clip(cosine, 0.05, None) / (1 + square / reach**2) ** 2
-    weight /= weight.sum(axis=1, keepdims=True)
-    middle = np.einsum("cm,cmi->ci", weight, q)
-    arm = q - middle[:, None]
-    plane = _rows(arm, normal) * np.sqrt(weight)[..., None]
-    matrix = plane.transpose(0, 2, 1) @ plane
-    right = np.einsum("cmp,cm->cp", plane,
-                      np.sqrt(weight) * np.einsum("cmi,cmi->cm", normal, offset))  # fmt: skip
-    # a share of point-to-point: planes alone let a flat or round part slide away
-    along = np.einsum("cm,cmi->ci", weight, offset)
-    second = np.einsum("cm,cmi,cmj->cij", weight, arm, arm)
-    trace = np.trace(second, axis1=1, axis2=2)
-    share = 0.15
-    matrix[:, :3, :3] += share * (trace[:, None, None] * np.eye(3) - second)
-    matrix[:, 3:6, 3:6] += share * np.eye(3)
-    matrix[:, 6, 6] += share * trace + (0.02 / keep.size_sd) ** 2
-    right[:, :3] += share * np.einsum("cm,cmi->ci", weight, np.cross(arm, offset))
-    right[:, 3:6] += share * along
-    right[:, 6] += share * np.einsum("cm,cmi,cmi->c", weight, arm, offset)
-    right[:, 6] -= (0.02 / keep.size_sd) ** 2 * np.log(poses.a)
-    matrix += 1e-7 * np.eye(7)
-    _move(poses, np.linalg.solve(matrix, right[..., None])[..., 0], middle)
-
-
-def _rows(arm: Floats, normal: Floats) -> Floats:
-    """Derivative (C, m, 7) of the distance along ``normal`` by turn, shift and log of size."""
-    return np.concatenate(
-        [np.cross(arm, normal), normal, np.einsum("cmi,cmi->cm", arm, normal)[..., None]], axis=2
-    )
-
-
-def _move(poses: _Poses, motion: Floats, middle: Floats) -> None:
-    from scipy.spatial.transform import Rotation
-
-    length = np.linalg.norm(motion[:, :3], axis=1)
-    motion[:, :3] *= np.minimum(1.0, 0.6 / np.maximum(length, 1e-12))[:, None]
-    turn = Rotation.from_rotvec(motion[:, :3]).as_matrix()
-    grow = np.exp(np.clip(motion[:, 6], -0.1, 0.1))
-    grow = np.clip(poses.a * grow, 0.7, 1.4) / poses.a
-    moved = np.einsum("cij,cj->ci", turn, poses.b - middle)
-    poses.b = grow[:, None] * moved + middle + motion[:, 3:6]
-    poses.R, poses.a = turn @ poses.R, poses.a * grow
-
-
-def _score(poses: _Poses, points: Floats, normals: Floats, shapes: Shapes,
-           oriented: bool) -> Floats:  # fmt: skip
-    """Mean distance (C,) m, capped at 8 cm; a wrong side costs as much as 6 cm."""
-    _, offset, _, cosine = _matched(poses, points, normals, shapes, oriented)
-    away = np.linalg.norm(offset, axis=2) + 0.03 * (1 - np.clip(cosine, -1, 1))
-    return np.asarray(np.minimum(away, 0.08).mean(axis=1) / np.sqrt(poses.a))
 
 
 def _different(poses: _Poses, shapes: Shapes, order: Ints, most: int, apart: float) -> Ints:

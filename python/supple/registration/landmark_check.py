@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.errors import InputError
+from supple.registration.landmark_exchange import exchanged
 from supple.registration.landmark_files import Landmarks
+from supple.registration.template import Template
 from supple.surface import Surface
 
 Floats = npt.NDArray[np.float64]
@@ -26,7 +28,10 @@ _SCALES = (("", 1.0), ("in mm", 1e-3), ("in m", 1e3), ("in cm", 1e-2), ("100 tim
            ("in dm", 0.1), ("10 times", 10.0))  # fmt: skip
 
 
-def check_on_scan(landmarks: Mapping[str, npt.ArrayLike] | Landmarks, scan: Surface) -> Landmarks:
+def check_on_scan(
+    landmarks: Mapping[str, npt.ArrayLike] | Landmarks, scan: Surface,
+    template: Template | None = None,
+) -> Landmarks:  # fmt: skip
     """The landmarks as they lie on the scan, with what was mended and said.
 
     Landmarks that are off the scan but on it as RAS, y-up, or in another unit are brought there.
@@ -34,10 +39,13 @@ def check_on_scan(landmarks: Mapping[str, npt.ArrayLike] | Landmarks, scan: Surf
     Args:
         landmarks: name → (3,) m, in the scan's frame; or what `read_landmarks` returned.
         scan: m, LPS.
+        template: whose landmarks tell whether two names are exchanged; without it that is not
+            looked at.
 
     Raises:
-        InputError: a landmark more than 60 mm from the scan in every reading, or left and right
-            swapped (or a mirrored scan): which of the two, only the user can know.
+        InputError: a landmark more than 60 mm from the scan in every reading; left and right
+            swapped (or a mirrored scan), which of the two only the user can know; two names
+            exchanged.
     """
     given = landmarks.points if isinstance(landmarks, Landmarks) else landmarks
     said = list(landmarks.said) if isinstance(landmarks, Landmarks) else []
@@ -56,6 +64,8 @@ def check_on_scan(landmarks: Mapping[str, npt.ArrayLike] | Landmarks, scan: Surf
              "misplaced." for k in np.flatnonzero(distance > _OFF)]  # fmt: skip
     placed = dict(zip(names, points, strict=True))
     _same_sides(placed, scan)
+    if template is not None:
+        _own_names(placed, scan, template)
     return Landmarks(placed, said)
 
 
@@ -101,6 +111,19 @@ def _same_sides(points: dict[str, Floats], scan: Surface) -> None:
         which = ", ".join(name[:-5] for name, other in pairs if other in points)
         raise InputError(f"left and right of {which} are swapped, or the scan is mirrored; "
                          "correct the names or the scan.")  # fmt: skip
+
+
+def _own_names(points: dict[str, Floats], scan: Surface, template: Template) -> None:
+    """Two landmarks that make a body only when exchanged are refused."""
+    front = _front(np.array(list(points.values())), scan)
+    found = exchanged(points, front, template)
+    if found is not None:
+        a, b = found.names
+        raise InputError(
+            f"landmarks must be named by where they are, but it looks as if {a} and {b} are "
+            f"exchanged: as given they are {found.given * 1e3:.0f} mm (rms) from those of a body, "
+            f"exchanged {found.exchanged * 1e3:.0f} mm; correct the names."
+        )
 
 
 def _front(points: Floats, scan: Surface) -> Floats:

@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -74,7 +75,8 @@ def read_landmarks(
         text = file.read_text(encoding="utf-8-sig")
         raw = _READERS[suffix](text, file)
     except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise InputError(f"{file} is no {suffix} file of landmarks ({error}).") from None
+        raise InputError(f"{file} is no {suffix} file of landmarks ({error}); export it again, or "
+                         "as a .csv file with the columns name, x, y, z.") from None  # fmt: skip
     if not raw.labels:
         raise InputError(f"{file} holds no landmarks; place and name at least one.")
     points, said = _named(raw, file)
@@ -89,7 +91,10 @@ def _named(raw: _Raw, file: Path) -> tuple[dict[str, Floats], list[str]]:
     points: dict[str, Floats] = {}
     said = []
     for label, numbers in zip(raw.labels, raw.points, strict=True):
-        name = landmark_name(label)
+        try:
+            name = landmark_name(label)
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from None
         point = np.array(numbers, dtype=np.float64)
         if point.shape != (3,) or not np.isfinite(point).all():
             raise InputError(f"{file}: landmark {label!r} must be at three finite numbers, got "
@@ -122,7 +127,8 @@ def _unit(
         if low <= spread < high:
             return metres(unit), f"The file names no unit: {unit}, as the landmarks' spread tells."
     raise InputError(f"{file} names no unit and its landmarks are up to {spread:.4g} apart, which "
-                     "is no torso in m, cm or mm; give unit=.")  # fmt: skip
+                     "is no torso in m, cm or mm; write them in mm, with a comment '# unit mm' "
+                     "or columns x_mm, y_mm, z_mm in a .csv file.")  # fmt: skip
 
 
 def _frame(named: str | None, given: str | None, file: Path) -> tuple[Floats, str]:
@@ -160,8 +166,10 @@ def _fcsv(text: str, file: Path) -> _Raw:
 def _json(text: str, file: Path) -> _Raw:
     raw = _Raw([], [])
     whole = json.loads(text)
-    if not isinstance(whole, dict) or "markups" not in whole:
-        raise ValueError("it holds no 'markups', as 3D Slicer's do")
+    if not isinstance(whole, dict):
+        raise ValueError("it is no object of names")
+    if "markups" not in whole:
+        return _plain_json(whole)
     for markup in whole["markups"]:
         points = markup.get("controlPoints", [])
         code = markup.get("coordinateUnits", "mm")
@@ -182,6 +190,17 @@ def _json(text: str, file: Path) -> _Raw:
             raw.labels.append(str(markup.get("name", "") if only else point.get("label", "")))
             raw.points.append([float(v) for v in point["position"]])
     return raw
+
+
+def _plain_json(whole: dict[str, Any]) -> _Raw:
+    """``{"xiphoid": [x, y, z], …}``, with "unit" and "frame" beside the names if known."""
+    unit, frame = whole.pop("unit", None), whole.pop("frame", None)
+    if unit is not None:
+        metres(unit)
+    for name, numbers in whole.items():
+        if not isinstance(numbers, list) or len(numbers) != 3:
+            raise ValueError(f"{name!r} must be a list of three numbers, or the file 3D Slicer's")
+    return _Raw(list(whole), [[float(v) for v in one] for one in whole.values()], unit, frame)
 
 
 def _pp(text: str, file: Path) -> _Raw:
@@ -205,7 +224,10 @@ def _csv(text: str, file: Path) -> _Raw:
     lines = [t for t in text.splitlines() if t.strip() and not t.lstrip().startswith("#")]
     raw = _Raw([], [], unit and unit[1], frame and _FRAMES.get(frame[1], frame[1]))
     name, axes, lines = _columns(lines, raw)
-    for row in csv.reader(lines, delimiter=_delimiter(lines)):
+    delimiter = _delimiter(lines)
+    for row in csv.reader(lines, delimiter=delimiter):
+        if delimiter != ",":  # spreadsheets of some countries: 1,5 for 1.5
+            row = [c if k == name else c.replace(",", ".") for k, c in enumerate(row)]
         raw.labels.append(row[name].strip())
         raw.points.append([float(row[axis]) for axis in axes if axis < len(row)])
     return raw

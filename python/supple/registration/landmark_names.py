@@ -77,6 +77,6 @@ def landmark_name(label: str, names: Iterable[str] = LANDMARKS) -> str:
 
 
 def _unknown(label: str, plain: str, names: list[str]) -> str:
-    near = get_close_matches(plain, names, n=3, cutoff=0.3)
+    near = get_close_matches(plain, names, n=3, cutoff=0.5)
     offer = f"; the nearest are {', '.join(near)}" if near else f"; known are {', '.join(names)}"
     return f"no landmark is called {label!r}{offer}; rename or remove it."

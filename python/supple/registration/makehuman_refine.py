@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from supple.core import core
 from supple.registration.makehuman_cut import Half
 
 Floats = npt.NDArray[np.float64]
@@ -91,7 +92,7 @@ def _faired(means: Any, triangles: Ints, at: Floats, free: Ints) -> Any:
     held = np.setdiff1d(np.arange(len(at)), free)
     force = -(bending[free][:, held] @ means[held]).tocsc()
     columns = np.flatnonzero(np.diff(force.indptr))
-    solved = np.linalg.solve(bending[free][:, free].toarray(), force[:, columns].toarray())
+    solved = _solved(bending[free][:, free].toarray(), force[:, columns].toarray())
     solved[np.abs(solved) < 1e-6] = 0
     solved /= solved.sum(axis=1, keepdims=True)
     rows, used = np.nonzero(solved)
@@ -121,3 +122,15 @@ def laplacian(at: Floats, triangles: Ints) -> tuple[Any, Floats]:
     stiffness = stiffness - sparse.diags_array(np.asarray(stiffness.sum(axis=1)).ravel())
     mass = np.bincount(triangles.ravel(), np.repeat(double / 6, 3), minlength=n)
     return stiffness.tocsr(), np.asarray(mass, dtype=np.float64)
+
+
+def _solved(matrix: Floats, right: Floats) -> Floats:
+    """x (n, k) of A x = b, A symmetric positive definite: A⁻¹ b.
+
+    By the core and a plain sum: bits of a BLAS change with the number of its threads, and the
+    template with them.
+    """
+    inverse = core().inverse_sum(matrix, np.zeros_like(matrix))
+    x = np.einsum("ij,jk->ik", inverse, right)
+    missing = right - np.einsum("ij,jk->ik", matrix, x)
+    return np.asarray(x + np.einsum("ij,jk->ik", inverse, missing))

@@ -37,8 +37,10 @@ _LEVEL, _FAR = 10e-3, 30e-3
 
 #: Name → unit and meaning, of each breast.
 OF_A_BREAST = {
-    "volume": ("ml", "between the skin within the outline and the chest wall behind it"),
-    "projection": ("mm", "nipple to the chest wall, the shortest way"),
+    "volume": ("ml", "between the skin within the outline and a soap film stretched over the "
+                     "outline, in place of the chest wall, which no scan sees; a chest that bulges "
+                     "there makes it too large, by tens of ml"),
+    "projection": ("mm", "nipple to that soap film, the shortest way"),
     "base_width": ("mm", "extent of the outline across the body"),
     "base_height": ("mm", "extent of the outline along the body"),
     "nipple_notch": ("mm", "nipple to sternal notch, straight"),
@@ -48,7 +50,7 @@ OF_A_BREAST = {
     "nipple_fold_skin": ("mm", "nipple to the fold below it, along the skin"),
     "ptosis": ("mm", "how far the nipple is below the fold, along the body"),
     "overhang": ("mm", "how far the lowest skin of the breast is below the fold"),
-}
+}  # fmt: skip
 #: Name → unit and meaning, of both: left minus right.
 OF_BOTH = {
     "volume_difference": ("ml", "left minus right"),

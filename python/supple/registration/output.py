@@ -21,6 +21,7 @@ import numpy.typing as npt
 import supple
 from supple.errors import InputError
 from supple.files import existing
+from supple.registration.body_size import body_size
 from supple.registration.measures import Measures, measures
 from supple.registration.metrics import Metrics, metrics
 from supple.registration.posture import Posture
@@ -46,6 +47,7 @@ class Outcome:
     title: str = ""
     said: Sequence[str] = ()  #: what was found or mended on reading
     weights: Mapping[str, float] = field(default_factory=dict)  #: of the energy
+    unit: str = ""  #: that the scan was read in
 
     @cached_property
     def curves(self) -> dict[str, Carried]:
@@ -82,6 +84,8 @@ class Outcome:
             "warnings": list(fit.warnings),
             "said": list(self.said),
             "metrics": asdict(m),
+            "body": asdict(body_size(fit)),
+            "scan_unit": self.unit,
             "measures": [asdict(row) for row in self.measures.rows],
             "ptosis": dict(self.measures.ptosis),
             "landmarks": {k: 1e3 * c.points[0] for k, c in self.landmarks.items()},
@@ -99,7 +103,8 @@ def write(outcome: Outcome, place: Place) -> None:
     from supple.surface import Surface
 
     fit = outcome.registration
-    Surface(fit.points, fit.template.triangles).write(place("registered.ply"))
+    sd = {} if fit.covariance is None else {"sd": 1e3 * fit.sd}
+    Surface(fit.points, fit.template.triangles).write(place("registered.ply"), values=sd)
     for suffix in ("ply", "obj", "glb"):
         write_lines(place(f"drawing.{suffix}"), outcome.curves)
     marks = {name: carried.points[0] for name, carried in outcome.landmarks.items()}
@@ -175,13 +180,15 @@ def versions() -> dict[str, str]:
 
 def _table(path: Path, outcome: Outcome) -> None:
     """One row a number."""
-    m = outcome.metrics
+    m, size = outcome.metrics, body_size(outcome.registration)
     rows: list[tuple[Any, ...]] = [
         ("metric", "surface_mae", "", m.surface_mae_mm, None, "mm"),
         ("metric", "surface_p95", "", m.surface_p95_mm, None, "mm"),
         ("metric", "used_share", "", m.used_share, None, "1"),
         ("metric", "landmark_mae", "", m.landmark_mae_mm, None, "mm"),
         ("metric", "seconds", "", m.seconds, None, "s"),
+        ("body", "chest_girth", "", size.girth_cm, None, "cm"),
+        ("body", "notch_to_folds", "", size.length_cm, None, "cm"),
     ]
     rows += [("landmark_error", row.name, "", row.error_mm, None, "mm") for row in m.landmarks]
     rows += [("measure", row.name, row.side, row.value, row.sd, row.unit)

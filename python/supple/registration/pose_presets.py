@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from supple.core import core
 from supple.registration.posture import Posture, posed
 from supple.registration.template import Floats, Ints, Template
 
@@ -74,25 +76,13 @@ class Shapes:
     Attributes:
         postures: S of them.
         points, normals: (S, n, 3) m and unit.
-        nearest: (S, cells) vertex numbers.
-        origin: (3,) m of the table; ``counts`` (3,) of its cells of ``size`` m.
+        table: the same for the core's search.
     """
 
     postures: tuple[Posture, ...]
     points: Floats
     normals: Floats
-    nearest: Ints
-    origin: Floats
-    counts: Ints
-    size: float
-
-    def at(self, shape: Ints, points: Floats) -> Ints:
-        """Vertex (c, m) near ``points`` (c, m, 3) m for ``shape`` (c,)."""
-        cell = ((points - self.origin) / self.size).astype(np.int32)
-        np.clip(cell, 0, (self.counts - 1).astype(np.int32), out=cell)
-        _, ny, nz = self.counts
-        flat = (cell[..., 0] * ny + cell[..., 1]) * nz + cell[..., 2]
-        return np.asarray(self.nearest[shape[:, None], flat])
+    table: Any
 
 
 _KNOWN: WeakKeyDictionary[Template, Shapes] = WeakKeyDictionary()
@@ -116,7 +106,11 @@ def _shapes(template: Template, size: float, margin: float) -> Shapes:
     centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     nearest = np.array([cKDTree(shape).query(centres)[1] for shape in points])
     normals = np.array([vertex_normals(shape, template.triangles) for shape in points])
-    return Shapes(postures, points, normals, nearest, low, counts, size)
+    table = core().PoseShapes(
+        points.shape[1], points.reshape(-1, 3), normals.reshape(-1, 3),
+        nearest.ravel().astype(np.int32), low, counts.astype(np.int32), size,
+    )  # fmt: skip
+    return Shapes(postures, points, normals, table)
 
 
 def vertex_normals(points: Floats, triangles: Ints) -> Floats:

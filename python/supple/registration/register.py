@@ -21,8 +21,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from supple.errors import InputError
+from supple.errors import ConvergenceError, InputError
 from supple.registration import uncertainty
+from supple.registration.advice import advised, too_little
 from supple.registration.body_prior import body_prior
 from supple.registration.found_landmarks import astray, found_landmarks, told_landmarks
 from supple.registration.initial_pose import Candidate, candidates
@@ -65,11 +66,24 @@ def register(
         InputError: landmarks that the template does not name, a scan that is no body in metres.
         ConvergenceError: nothing of the template comes near the scan.
     """
-    keep, clock = settings or RegisterSettings(), _Clock(progress)
+    keep = settings or RegisterSettings()
     if template is None:
         from supple.registration.procedural import torso
 
         template = torso()
+    try:
+        found = _stages(scan, template, landmarks, keep, start, progress)
+    except ConvergenceError as error:
+        reason = too_little(scan, template, start is not None)
+        raise ConvergenceError(reason, cause=str(error)) from None
+    return advised(found, landmarks, keep.landmark_sd)
+
+
+def _stages(
+    scan: Surface, template: Template, landmarks: Mapping[str, npt.ArrayLike] | None,
+    keep: RegisterSettings, start: Posture | None, progress: Callable[[str], None] | None,
+) -> Registration:  # fmt: skip
+    clock = _Clock(progress)
     clock.stage("scan")
     _check(scan)
     named = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
@@ -156,7 +170,7 @@ def _starts(
 
 def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str, Floats],
          keep: RegisterSettings) -> RigFit:  # fmt: skip
-    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd, False)
+    return rig.fit(start, stages, keep.weights, keep.priors, named, keep.landmark_sd, "lead")
 
 
 def _fine(
@@ -171,7 +185,7 @@ def _fine(
     priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
-        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, False)
+        fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, "pairs")
         fit, marks, sds = _told(rig, scan, fit, stages[:-1], loose, marks, sds, keep)
         first, stages = fit.posture, stages[-1:]
         if fit.patch_sd > keep.follows:
@@ -197,7 +211,7 @@ def _told(
         marks, sds = found | dict(given), of_found | dict(given_sds)
         if not left or far < keep.slid:
             break
-        fit = rig.fit(fit.posture, stages, keep.weights, loose, marks, sds, False)
+        fit = rig.fit(fit.posture, stages, keep.weights, loose, marks, sds, "pairs")
     return fit, marks, sds
 
 
@@ -221,7 +235,7 @@ def _rivals(
     return decided(
         list(zip(scores, tried, strict=True)), rig.template,
         lambda fit: rig.fit(
-            fit.posture, keep.fine[:1], keep.weights, loose, named, keep.landmark_sd),
+            fit.posture, keep.face, keep.weights, loose, named, keep.landmark_sd, "lead"),
         keep,
     )  # fmt: skip
 

@@ -10,12 +10,13 @@ from supple.registration.rig_settings import Priors, Stage
 from supple.registration.trust import Doubts
 from supple.registration.weights import Weights
 
-#: From a start that is a few cm off: bones first.
+#: From a start that is a few cm off, but turned and sized as well as one body can be.
 COARSE = (
-    Stage("rigid", 5, 2e-3, 0.12, 0.06, 75.0, 0.3, 0.05, 4, 8),
     Stage("bones", 8, 2e-3, 0.10, 0.04, 75.0, 0.3, 0.03, 4, 8),
     Stage("scales", 6, 1e-3, 0.08, 0.025, 70.0, 0.3, 0.02, 3, 6),
 )  # fmt: skip
+#: All shapes, as far as it takes to tell one facing from another.
+FACE = (Stage("all", 4, 1e-3, 0.05, 0.015, 60.0, 0.3, 0.01, 4, 6),)
 #: All shapes, down to the noise.
 FINE = (
     Stage("all", 8, 5e-4, 0.05, 0.015, 60.0, 0.3, 0.01, 2, 3),
@@ -35,6 +36,7 @@ class RegisterSettings:
     weights: Weights = field(default_factory=Weights)
     priors: Priors | None = None  #: how bodies differ; `body_prior` of the template
     coarse: tuple[Stage, ...] = COARSE
+    face: tuple[Stage, ...] = FACE
     fine: tuple[Stage, ...] = FINE
     warm: tuple[Stage, ...] = WARM
     search: SearchSettings = field(default_factory=SearchSettings)

@@ -6,6 +6,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from supple.page import bullets, rows
+from supple.registration.body_size import body_size
 from supple.registration.measures import OF_A_BREAST, OF_BOTH
 
 if TYPE_CHECKING:
@@ -75,14 +76,16 @@ def _both(data: ReportData) -> str:
 
 
 def _metrics(data: ReportData) -> list[tuple[str, str]]:
-    m = data.metrics
+    m, size = data.metrics, body_size(data.registration)
     mean = "none given" if m.landmark_mae_mm is None else f"{m.landmark_mae_mm:.2f} mm"
     return [
         ("surface, mean distance", f"{m.surface_mae_mm:.2f} mm"),
         ("surface, 95 % closer than", f"{m.surface_p95_mm:.2f} mm"),
         ("share of the scan used", f"{100 * m.used_share:.0f} %"),
         ("landmarks, mean distance", mean),
-        ("time", f"{m.seconds:.2f} s"),
+        ("chest under the breasts", f"{size.girth_cm:.0f} cm around"),
+        ("sternal notch to folds", f"{size.length_cm:.0f} cm"),
+        ("time of the fit alone", f"{m.seconds:.2f} s"),
         ("iterations", str(m.iterations)),
     ]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ from supple.surface import Surface
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 __all__ = ["COLD", "WARM", "Priors", "Rig", "RigFit", "Stage"]
+Report = Literal["lead", "pairs", "whole"]
+_REPORTS = ("lead", "pairs", "whole")
 _TERMS = ("data", "scale", "blendshape", "joint", "landmark", "rotation")
 
 
@@ -49,7 +51,7 @@ class RigFit:
         patch_sd: m, robust standard deviation of the mean residual of a patch, as found.
         residual_sd: m, that of all residuals.
         observations: patches of the template that the scan shows.
-        scan_points, scan_normals: (c, 3) of the thinned scan.
+        scan_points, scan_normals: (c, 3) of the thinned scan, of those points that were looked at.
         triangle: (c,) of the template where each of them lands; -1 where it has no partner.
         barycentric: (c, 3); distance (c,) m, NaN without partner.
         used: (c,) robust weight 0..1 of each; vertex_used (n,) of each vertex' pair.
@@ -162,14 +164,16 @@ class Rig:
         priors: Priors | None = None,
         landmarks: Mapping[str, npt.ArrayLike] | None = None,
         landmark_sd: float | Mapping[str, float] = 5e-3,
-        matrices: bool = True,
+        report: Report = "whole",
     ) -> RigFit:
         """Fit to the scan from ``start``; other threads may run meanwhile.
 
         Args:
             landmarks: name → (3,) m on the scan.
             landmark_sd: m, of all or of each.
-            matrices: False: those of the result stay empty (0, 0), which saves a tenth.
+            report: how much it says, as the rest takes time: a "lead" to another fit has pairs
+                only of the points that its last stage used, and neither their spread nor
+                matrices, which stay empty (0, 0); "pairs": all but the matrices; the "whole".
 
         Raises:
             InputError: no scan, a landmark that the template does not name.
@@ -180,7 +184,7 @@ class Rig:
             found = self._fit.run(
                 *_arrays(start), weights_in_core(weights or Weights()),
                 priors_in_core(chosen, self.template), [stage_in_core(stage) for stage in stages],
-                *self._landmarks(named, landmark_sd), matrices,
+                *self._landmarks(named, landmark_sd), _REPORTS.index(report),
             )  # fmt: skip
         except core().Error as error:
             kind = ConvergenceError if "pairs" in str(error) else InputError
@@ -223,14 +227,15 @@ class Rig:
         )
 
     def _result(self, found: Any, priors: Priors) -> RigFit:
-        posture, scan = Posture(*found.posture), self._fit.scan
         energy = {name: getattr(found.terms, name) for name in _TERMS}
+        scan, asked = self._fit.scan, slice(None, None, found.every_point)
         return RigFit(
-            posture, self.vertices(posture), found.converged, found.last_step, found.iterations,
-            found.history, found.stage_seconds, energy,
+            Posture(*found.posture), found.points, found.converged, found.last_step,
+            found.iterations, found.history, found.stage_seconds, energy,
             found.data_matrix, found.prior_matrix, found.patch_sd, found.residual_sd,
-            found.observations, scan.points, scan.normals, found.triangle.astype(np.int64),
-            found.barycentric, found.distance, found.used, found.vertex_used, priors.noise,
+            found.observations, scan.points[asked], scan.normals[asked],
+            found.triangle[asked].astype(np.int64), found.barycentric[asked],
+            found.distance[asked], found.used[asked], found.vertex_used, priors.noise,
         )  # fmt: skip
 
 

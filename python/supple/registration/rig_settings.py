@@ -58,9 +58,12 @@ class Priors:
             that the template lacks.
         patch: m; data within patch × patch count as one observation however dense they are, as
             neighbours' residuals share their cause.
-        scale: (K,) of s_k − s_parent, and of s − 1 for the root; 0.1.
+        scale: (K,) or (K, 3) of s_k − s_parent, and of s − 1 for the root; 0.1.
+        scale_mean: (K, 3) of the same; 0.
         joint: (K,) m of T_k(j_k) − T_parent(j_k); 1 mm: a joint is tight, and cheap to hold.
-        rotation: (K,) rad, of a bone against its parent; 0.5: only bones that see no data stay.
+        rotation: (K,) or (K, 3) rad, of a bone against its parent, along the parent's axes; 0.5:
+            only bones that see no data stay.
+        rotation_mean: (K, 3) of the same; 0.
         blend_mean, blend_covariance: (A,), (A, A) of a statistical prior; 0 and I: shapes are made
             so that a coefficient of 1 is one standard deviation.
         stiff_joints: joints hold exactly, by Lagrange multipliers.
@@ -73,8 +76,10 @@ class Priors:
     noise: float = 2e-3
     patch: float = 15e-3
     scale: npt.ArrayLike | None = None
+    scale_mean: npt.ArrayLike | None = None
     joint: npt.ArrayLike | None = None
     rotation: npt.ArrayLike | None = None
+    rotation_mean: npt.ArrayLike | None = None
     blend_mean: npt.ArrayLike | None = None
     blend_covariance: npt.ArrayLike | None = None
     stiff_joints: bool = False
@@ -101,9 +106,9 @@ def priors_in_core(priors: Priors, template: Template) -> Any:
     made = core().RigPriors()
     for name in ("noise", "patch", "stiff_joints", "convex"):
         setattr(made, name, getattr(priors, name))
-    for name in ("scale", "joint", "rotation", "blend_mean"):
+    for name in ("scale", "scale_mean", "joint", "rotation", "rotation_mean", "blend_mean"):
         if getattr(priors, name) is not None:
-            setattr(made, name, np.asarray(getattr(priors, name), dtype=np.float64))
+            setattr(made, name, np.asarray(getattr(priors, name), dtype=np.float64).ravel())
     if priors.blend_covariance is not None:
         made.blend_precision = _inverse(np.asarray(priors.blend_covariance, dtype=np.float64))
     if priors.bounded:

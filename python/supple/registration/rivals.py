@@ -80,7 +80,7 @@ def decided(
     coarse: Sequence[tuple[float, RigFit]], template: Template,
     refit: Callable[[RigFit], RigFit], keep: RegisterSettings,
 ) -> list[Rival]:  # fmt: skip
-    """The best of each facing, ``refit``; that against which least speaks is first.
+    """The best of each facing, ``refit`` if there are more; the likeliest is first.
 
     Args:
         coarse: scores and fits, best first.
@@ -90,5 +90,5 @@ def decided(
         new = all(apart(fit.posture, one.posture, template) > keep.turned for one in faces)
         if new and score <= keep.faced * coarse[0][0]:
             faces.append(fit)
-    fits = [refit(one) for one in faces]
+    fits = [refit(one) for one in faces] if len(faces) > 1 else faces
     return sorted((Rival(fit, against(fit)) for fit in fits), key=lambda one: one.against)

@@ -26,6 +26,8 @@ Floats = npt.NDArray[np.float64]
 
 #: Largest extent, m, of what may be a scan of a torso or of a whole body, arms raised.
 BODY = (0.15, 2.5)
+#: From here, m, up to BODY a scan may be in its unit and show a part of a torso only.
+_PART = 0.03
 #: Which unit a file is in by its largest extent, in its own numbers.
 _BY_SIZE = (("m", 0.15, 2.2), ("dm", 2.2, 15.0), ("cm", 15.0, 220.0), ("mm", 220.0, 2500.0))
 #: Extents in cm that may as well be a torso of 0.4 to 1 m in inches.
@@ -83,27 +85,40 @@ def _unit(file: Path, extent: float, given: str | None, head: str) -> tuple[str,
         unit, why = _by_size(file, extent), "found from its size"
     size = extent * metres(unit)
     if not BODY[0] <= size <= BODY[1]:
-        fits = [u for u in METRES if u != "um" and BODY[0] <= extent * METRES[u] <= BODY[1]]
-        hint = f"; unit={fits[0]!r} would make it {extent * METRES[fits[0]]:.2f} m" if fits else ""
         raise InputError(
             f"{file} spans {extent:.4g} {unit} ({why}), {size:.3g} m, but a scan of a torso spans "
-            f"{BODY[0]} to {BODY[1]} m{hint}; give its unit."
+            f"{BODY[0]} to {BODY[1]} m; {_remedy(extent, size)}"
         )
     return unit, f"The unit is {unit}, {why}: the scan spans {size:.2f} m."
+
+
+def _remedy(extent: float, size: float) -> str:
+    """Another unit, or more of the body; ``size`` is m as it was read."""
+    more = "scan the front from neck to waist and from armpit to armpit"
+    fits = [u for u in METRES if u != "um" and BODY[0] <= extent * METRES[u] <= BODY[1]]
+    if not fits:
+        return f"{more}, and give its unit."
+    other = f"if it is in {fits[0]} ({extent * METRES[fits[0]]:.2f} m), {_given(fits[0])}."
+    return other if not _PART <= size < BODY[0] else f"{more}; {other}"
+
+
+def _given(unit: str) -> str:
+    """How a unit is given, on the command line and in Python."""
+    return f"give --unit {unit} (in Python, unit={unit!r})"
 
 
 def _by_size(file: Path, extent: float) -> str:
     if _OR_INCHES[0] <= extent <= _OR_INCHES[1]:
         raise InputError(
             f"{file} spans {extent:.4g}, which may be {extent:.0f} cm or {extent * 2.54:.0f} cm in "
-            "inches; give unit='cm' or unit='in'."
+            f"inches; {_given('cm')} or --unit in."
         )
     for unit, low, high in _BY_SIZE:
         if low <= extent < high:
             return unit
     raise InputError(
         f"{file} spans {extent:.4g}, which is a torso's {BODY[0]} to {BODY[1]} m in no unit (m, "
-        "dm, cm, mm); check that it is a scan of a torso, and give unit=."
+        "dm, cm, mm); check that it is a scan of a torso, and give --unit (in Python, unit=)."
     )
 
 

@@ -50,5 +50,6 @@ def read_template(path: str | Path) -> Template:
 
 def _checked(file: Path) -> Path:
     if file.suffix.lower() not in _FORMATS:
-        raise InputError(f"path must end in {' or '.join(_FORMATS)}, got {file.name!r}.")
+        raise InputError(f"a template's file must end in {' or '.join(_FORMATS)}, as what `supple "
+                         f"template make` writes, got {str(file)!r}.")  # fmt: skip
     return file

@@ -93,9 +93,11 @@ def rows(
     found: list[Row] = []
     for number, case in enumerate(cases):
         scan = torso_cases.scan_of(case, known)
-        for level in levels(known[case.fitted]):
+        places = list(levels(known[case.fitted]))
+        for done, level in enumerate(places):
             if progress is not None:
-                progress(f"{case.key}, {level.sweep} {level.at:g}", number / len(cases))
+                progress(f"{case.key}, {level.sweep} {level.at:g}",
+                         (number + done / len(places)) / len(cases))  # fmt: skip
             found.append(row(case, scan, known, level))
     return found
 
@@ -152,5 +154,5 @@ def row(case: Case, scan: SyntheticScan, known: Mapping[str, Template], level: L
         "pose": case.pose, "shape": case.shape, "noise_mm": 1e3 * case.noise,
         "surface_mm": result.surface, "landmark_mm": result.landmark,
         "worst_landmark_mm": result.worst_landmark[1], "failed": result.failed,
-        "trustworthy": found.trustworthy, "seconds": sum(found.seconds.values()),
+        "trustworthy": found.trustworthy, "seconds": found.seconds["total"],
     }  # fmt: skip

@@ -16,6 +16,8 @@ _SYMBOLS = {"data": "λ data", "scale": "λ$_s$ scale", "blendshape": "λ$_b$ bl
             "joint": "λ$_j$ joint", "landmark": "λ$_l$ landmark"}  # fmt: skip
 _COLOURS = {"standing": "tab:blue", "supine": "tab:orange", "arms_up": "tab:green",
             "tilted": "tab:red"}  # fmt: skip
+#: Lines of each pair of templates.
+_STYLES = ("-", "--", ":")
 _ERRORS = (("surface_mm", "surface, mm"), ("landmark_mm", "landmarks, mm"))
 
 
@@ -33,23 +35,32 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> Path:
         panels[-1, column].set_xlabel(_AXES.get(sweep, f"factor of {_SYMBOLS.get(sweep, sweep)}"))
     for axes, (_, label) in zip(panels[:, 0], _ERRORS, strict=True):
         axes.set_ylabel(label)
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    bodies = len({row.get("shape") for row in rows})
+    figure.suptitle(f"Template registered to scans with a known answer, bodies a pose: {bodies}",
+                    fontsize=10)  # fmt: skip
+    legend = {label: handle for axes in panels.flat for handle, label in
+              zip(*axes.get_legend_handles_labels(), strict=True)}  # fmt: skip
+    figure.legend(legend.values(), legend.keys(), loc="outside lower center", fontsize=9,
+                  ncols=3 if len(sweeps) > 1 else 1)  # fmt: skip
     return save(figure, path)
 
 
 def _panel(axes: Any, rows: Sequence[dict[str, Any]], error: str) -> None:
-    """Mean over cases by pose, from the least to the largest shaded, failures as crosses."""
-    for pose in dict.fromkeys(row["pose"] for row in rows):
-        own = [row for row in rows if row["pose"] == pose]
+    """Mean over bodies by pose and pair, from the least to the largest shaded, failures crossed."""
+    pairs = list(dict.fromkeys(row["pair"] for row in rows))
+    for pose, pair in dict.fromkeys((row["pose"], row["pair"]) for row in rows):
+        own = [row for row in rows if (row["pose"], row["pair"]) == (pose, pair)]
         at = sorted({row["at"] for row in own})
         values = [np.array([row[error] for row in own if row["at"] == x]) for x in at]
-        colour = _COLOURS.get(pose, "tab:grey")
-        axes.plot(at, [v.mean() for v in values], "o-", ms=4, color=colour, label=f"{pose}, mean")
+        colour, style = _COLOURS.get(pose, "tab:grey"), _STYLES[pairs.index(pair) % len(_STYLES)]
+        axes.plot(at, [v.mean() for v in values], marker="o", ms=4, color=colour, ls=style,
+                  label=f"{pair.replace('→', ' scanned, ')} fitted: {pose}")  # fmt: skip
         axes.fill_between(at, [v.min() for v in values], [v.max() for v in values],
-                          color=colour, alpha=0.15, lw=0)  # fmt: skip
-        bad = [row for row in own if row["failed"]]
-        axes.plot([row["at"] for row in bad], [row[error] for row in bad], "x", color=colour, ms=6)
+                          color=colour, alpha=0.12, lw=0)  # fmt: skip
+    bad = [row for row in rows if row["failed"]]
+    if bad:
+        axes.plot([row["at"] for row in bad], [row[error] for row in bad], "x", color="black", ms=8,
+                  mew=1.5, label="failed: surface > 5 mm or a landmark > 20 mm")  # fmt: skip
     if rows and rows[0]["sweep"] not in _AXES:
         axes.set_xscale("log")
     axes.set_ylim(bottom=0)

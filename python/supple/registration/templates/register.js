@@ -6,34 +6,20 @@
   const names = { distance: "Distance of the scan to the registered skin (mm)",
     sd: "Standard deviation of the registered skin (mm)" };
 
-  function bytes(text) {
-    const raw = atob(text), out = new Uint8Array(raw.length);
-    for (let k = 0; k < raw.length; k++) out[k] = raw.charCodeAt(k);
-    return out.buffer;
-  }
-  function columns(flat) {
-    const n = flat.length / 3, out = [0, 1, 2].map(() => new flat.constructor(n));
-    for (let k = 0; k < n; k++) for (let c = 0; c < 3; c++) out[c][k] = flat[3 * k + c];
-    return out;
-  }
-  const floats = (text) => new Float32Array(bytes(text));
   const layer = (name) => document.querySelector('[data-layer="' + name + '"]');
-  const ramp = [[0, "#f7e8da"], [0.25, "#bfdccb"], [0.5, "#74b3bd"], [0.75, "#3b7ba6"], [1, "#26407a"]];
-  const light = { ambient: 0.5, diffuse: 0.65, specular: 0.1, roughness: 0.8, fresnel: 0.1 };
-  const lamp = { x: 6e4, y: 9e4, z: -1e5 }; // as plotly.js turns it: from the front, above
 
   function surface(name, plain, mode) {
-    const own = data[name], [x, y, z] = columns(floats(own.points));
-    const coloured = state.mode === mode && own.values;
+    const own = data[name], coloured = state.mode === mode && own.values;
+    const scale = { colorscale: page.ramp, cmin: 0, cmax: data.most[mode] };
     if (!own.triangles) {
-      const marker = { size: 1.8, color: coloured ? floats(own.values) : plain, colorscale: ramp, cmin: 0, cmax: data.most[mode] };
+      const [x, y, z] = page.columns(page.floats(own.points));
+      const marker = Object.assign({ size: 1.8, color: coloured ? page.floats(own.values) : plain }, scale);
       return { type: "scatter3d", mode: "markers", x, y, z, marker, hoverinfo: "skip" };
     }
-    const [i, j, k] = columns(new Uint32Array(bytes(own.triangles)));
     const colour = coloured
-      ? { intensity: floats(own.values), colorscale: ramp, cmin: 0, cmax: data.most[mode], showscale: false, hovertemplate: "%{intensity:.1f} mm<extra></extra>" }
-      : { color: plain, hoverinfo: "skip" };
-    return Object.assign({ type: "mesh3d", name, x, y, z, i, j, k, lighting: light, lightposition: lamp }, colour);
+      ? Object.assign({ intensity: page.floats(own.values), showscale: false, hoverinfo: "all", hovertemplate: "%{intensity:.1f} mm<extra></extra>" }, scale)
+      : { color: plain };
+    return page.mesh(own.points, own.triangles, Object.assign({ name }, colour));
   }
   const raised = (p) => [p[0], p[1] - 1.2, p[2]]; // towards the front, so that the skin does not hide it
 
@@ -58,34 +44,13 @@
       marker: { size: 5, color: data.landmarks.map((l) => (l.on ? "#0b5c8a" : "#c27a00")), line: { color: "#fff", width: 1 } }, hoverinfo: "text" };
   }
 
-  const box = (function () {
-    const lo = [Infinity, Infinity, Infinity], hi = [-Infinity, -Infinity, -Infinity];
-    columns(floats(data.skin.points)).forEach((values, c) => values.forEach((v) => {
-      lo[c] = Math.min(lo[c], v); hi[c] = Math.max(hi[c], v);
-    }));
-    return { lo: lo.map((v) => v - 30), hi: hi.map((v) => v + 30) };
-  })();
-  const middle = box.lo.map((v, c) => (v + box.hi[c]) / 2);
+  const box = page.boxOf([data.skin.points], 30);
 
-  function letters() {
-    const x = [], y = [], z = [], text = ["R", "L", "A", "P", "I", "S"];
-    text.forEach((_, n) => {
-      const p = middle.slice(), c = n >> 1;
-      if (c === 1) { p[0] = box.hi[0] - (n % 2 ? 6 : 28); p[2] = box.lo[2] + 6; }
-      p[c] = n % 2 ? box.hi[c] - 6 : box.lo[c] + 6;
-      x.push(p[0]); y.push(p[1]); z.push(p[2]);
+  function besides() {
+    const letters = page.letters(box, (p, c, far) => {
+      if (c === 1) { p[0] = box.hi[0] - (far ? 6 : 28); p[2] = box.lo[2] + 6; }
     });
-    return { type: "scatter3d", mode: "text", x, y, z, text: text.map((t) => "<b>" + t + "</b>"),
-      textfont: { size: 20, color: "#0b5c8a" }, hoverinfo: "skip" };
-  }
-  function triad() {
-    const at = [box.lo[0] + 4, box.lo[1] + 4, box.lo[2] + 8], x = [], y = [], z = [];
-    [[50, 0, 0], [0, 50, 0], [0, 0, 50]].forEach((d) => {
-      x.push(at[0], at[0] + d[0], null); y.push(at[1], at[1] + d[1], null); z.push(at[2], at[2] + d[2], null);
-    });
-    return [{ type: "scatter3d", mode: "lines", x, y, z, line: { color: "#14232e", width: 5 }, hoverinfo: "skip" },
-      { type: "scatter3d", mode: "text", x: [at[0] + 30], y: [at[1]], z: [at[2] + 9], text: ["50 mm"],
-        textfont: { size: 12, color: "#14232e" }, hoverinfo: "skip" }];
+    return [letters].concat(page.scaleBar([box.lo[0] + 4, box.lo[1] + 4, box.lo[2] + 8], 1));
   }
 
   function traces() {
@@ -94,25 +59,13 @@
     if (layer("skin").checked) out.push(surface("skin", "#9fb8c8", "sd"));
     if (layer("curves").checked) data.curves.forEach((line) => out.push(...curve(line)));
     if (layer("landmarks").checked) out.push(landmarks());
-    return out.concat([letters()], triad());
+    return out.concat(besides());
   }
   function camera() {
     const far = 1.6, cameras = {
       front: { eye: { x: 0, y: -far, z: 0.05 } }, right: { eye: { x: -far, y: -0.25, z: 0.05 } },
       left: { eye: { x: far, y: -0.25, z: 0.05 } }, below: { eye: { x: 0, y: -far, z: -0.9 } } };
     return Object.assign({ projection: { type: "orthographic" }, up: { x: 0, y: 0, z: 1 } }, cameras[state.view]);
-  }
-  function layout(look) {
-    const size = box.hi.map((v, c) => v - box.lo[c]), tall = scene.clientHeight * 0.85,
-      zoom = Math.min(1.7 / size[2], (1.6 * scene.clientWidth) / tall / size[0]);
-    const axis = (c) => ({ range: [box.lo[c], box.hi[c]], visible: false });
-    return { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "#fff", uirevision: "keep",
-      scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), camera: look, aspectmode: "manual",
-        aspectratio: { x: zoom * size[0], y: zoom * size[1], z: zoom * size[2] } } };
-  }
-  function press(kind) {
-    document.querySelectorAll("[data-" + kind + "]").forEach((button) =>
-      button.setAttribute("aria-pressed", String(button.dataset[kind] === state[kind])));
   }
   function scale() {
     const most = data.most[state.mode];
@@ -121,10 +74,11 @@
     document.getElementById("ticks").innerHTML = most ? [0, 1, 2, 3, 4].map((n) => "<span>" + (n * most) / 4 + "</span>").join("") : "";
   }
   function draw(reset) {
-    const current = scene._fullLayout && scene._fullLayout.scene && scene._fullLayout.scene.camera;
-    press("mode"); press("view"); scale();
-    return Plotly.react(scene, traces(), layout(reset || !current ? camera() : current),
-      { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: true, plotlyServerURL: "" });
+    const current = page.seen(scene), look = reset || !current ? camera() : current;
+    page.press("mode", state.mode);
+    page.press("view", state.view);
+    scale();
+    return Plotly.react(scene, traces(), page.layout(scene, box, look, { tall: 1.7, wide: 1.6 }), page.settings);
   }
   function mode(name) {
     state.mode = name;
@@ -132,22 +86,18 @@
     layer("skin").checked = name === "sd";
   }
 
-  document.querySelectorAll("[data-mode]").forEach((button) => button.addEventListener("click", () => {
-    mode(button.dataset.mode);
+  page.onClick("mode", (name) => {
+    mode(name);
     draw(false);
-  }));
-  document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => {
-    state.view = button.dataset.view;
+  });
+  page.onClick("view", (name) => {
+    state.view = name;
     draw(true).then(() => Plotly.relayout(scene, { "scene.camera": camera() }));
-  }));
+  });
   document.querySelectorAll("[data-layer]").forEach((box) => box.addEventListener("change", () => draw(false)));
 
   const wanted = new URLSearchParams(location.hash.slice(1));
   if (["front", "left", "right", "below"].includes(wanted.get("view"))) state.view = wanted.get("view");
   mode(names[wanted.get("mode")] ? wanted.get("mode") : "drawing");
-  try {
-    draw(true);
-  } catch (error) {
-    scene.textContent = "The 3-D view needs WebGL, which this browser does not offer; picture.png does not.";
-  }
+  page.begin(scene, () => draw(true), "picture.png does not.");
 })();
