@@ -25,16 +25,16 @@ _TRUNK = np.array([
     (-0.31, 0.176, -0.108, 0.118, 2.3),
     (-0.23, 0.149, -0.112, 0.090, 2.3),
     (-0.15, 0.132, -0.116, 0.077, 2.4),
-    (-0.08, 0.135, -0.113, 0.088, 2.45),
-    (0.00, 0.142, -0.101, 0.101, 2.5),
-    (0.07, 0.138, -0.077, 0.104, 2.5),
+    (-0.08, 0.135, -0.115, 0.088, 2.45),
+    (0.00, 0.141, -0.103, 0.101, 2.5),
+    (0.07, 0.136, -0.075, 0.103, 2.5),
     (0.12, 0.122, -0.044, 0.096, 2.45),
     (0.16, 0.094, -0.012, 0.087, 2.2),
     (0.20, 0.060, 0.002, 0.070, 2.0),
     (0.26, 0.040, 0.000, 0.040, 2.0),
 ])  # fmt: skip
 
-SHOULDER = np.array([0.158, 0.027, 0.103])  #: centre of the left humeral head, m
+SHOULDER = np.array([0.160, 0.029, 0.101])  #: centre of the left humeral head, m
 ARM = np.array([0.62, 0.02, -0.78]) / np.linalg.norm([0.62, 0.02, -0.78])  #: along the left arm
 NECK = np.array([0.0, 0.040, 0.150])  #: base of the neck, m
 NECK_AXIS = np.array([0.0, -0.29, 0.957]) / np.linalg.norm([0.29, 0.957])
@@ -48,10 +48,10 @@ BREAST_AXES = np.array([
 NIPPLE = np.array([0.0080, -0.0090, 0.0540])  #: in the breast's axes, m
 
 #: Ends (m) and radii (m) of the cones along collar bone, trapezius, neck, pectoral and upper arm.
-_COLLAR = ((0.022, 0.034, 0.122), (0.145, 0.031, 0.104), 0.045, 0.042)
-_TRAPEZIUS = ((0.011, 0.055, 0.194), (0.146, 0.043, 0.110), 0.028, 0.032)
+_COLLAR = ((0.022, 0.034, 0.122), (0.146, 0.031, 0.102), 0.045, 0.042)
+_TRAPEZIUS = ((0.011, 0.055, 0.191), (0.147, 0.044, 0.108), 0.028, 0.032)
 _NECK = ((0.0, 0.031, 0.119), (0.0, -0.053, 0.388), 0.049, 0.0485)
-_PECTORAL = ((0.105, -0.033, 0.079), (0.182, -0.003, 0.072), 0.030, 0.032)
+_PECTORAL = ((0.109, -0.031, 0.078), (0.185, -0.001, 0.071), 0.030, 0.032)
 _UPPER_ARM = (0.047, 0.041)
 _DELTOID = (0.047, 0.053, 0.085)  # half axes, m
 #: Middles and half axes of the breast's lower pole and of its upper slope, in its axes, m.
@@ -65,7 +65,7 @@ def level(points: Floats) -> Floats:
     body = smooth_min(trunk(p), shoulder_girdle(p), 0.05)
     body = smooth_min(body, neck(p), 0.035)
     # the armpit is a narrow cleft, the front of the shoulder a soft hollow
-    softness = 0.024 + 0.016 / (1 + np.exp(-(p[:, 2] - 0.075) / 0.010))
+    softness = 0.024 + 0.016 / (1 + np.exp(-(p[:, 2] - 0.072) / 0.010))
     body = smooth_min(body, arm(p), softness)
     body = smooth_min(body, pectoral(p), 0.030)
     return smooth_min(body, *breast(p))
@@ -112,7 +112,7 @@ def trunk(p: Floats) -> Floats:
 
 def _furrows(p: Floats) -> Floats:
     behind = 1 / (1 + np.exp(-(p[:, 1] - 0.02) / 0.015))
-    spine = 0.009 * np.exp(-((p[:, 0] / 0.022) ** 2)) * np.exp(-(((p[:, 2] + 0.07) / 0.15) ** 4))
+    spine = 0.012 * np.exp(-((p[:, 0] / 0.028) ** 2)) * np.exp(-(((p[:, 2] + 0.07) / 0.15) ** 4))
     sternum = 0.003 * np.exp(-((p[:, 0] / 0.03) ** 2)) * np.exp(-(((p[:, 2] - 0.03) / 0.09) ** 4))
     return np.asarray(spine * behind + sternum * (1 - behind))
 
@@ -156,7 +156,7 @@ def breast(p: Floats) -> tuple[Floats, Floats]:
     mound = smooth_min(pole, slope, 0.05)
     areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
     nipple = np.linalg.norm(q - NIPPLE + (0.0, 0.0, 0.003), axis=1) - 0.0055
-    softness = 0.015 + 0.048 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
+    softness = 0.015 + 0.044 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
     return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
 
 
