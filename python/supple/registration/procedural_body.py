@@ -21,31 +21,42 @@ Floats = npt.NDArray[np.float64]
 
 #: Trunk: height, half breadth, front, back (m), exponent of the superellipse.
 _TRUNK = np.array([
-    (-0.40, 0.188, -0.104, 0.132, 2.3),
-    (-0.31, 0.179, -0.117, 0.116, 2.3),
-    (-0.23, 0.160, -0.122, 0.090, 2.3),
-    (-0.15, 0.138, -0.115, 0.078, 2.35),
-    (-0.08, 0.137, -0.109, 0.084, 2.4),
-    (0.00, 0.144, -0.101, 0.098, 2.45),
-    (0.07, 0.141, -0.080, 0.103, 2.45),
-    (0.12, 0.124, -0.048, 0.101, 2.4),
-    (0.16, 0.096, -0.016, 0.092, 2.2),
-    (0.20, 0.060, 0.000, 0.072, 2.0),
+    (-0.40, 0.188, -0.099, 0.134, 2.3),
+    (-0.31, 0.176, -0.108, 0.118, 2.3),
+    (-0.23, 0.149, -0.112, 0.090, 2.3),
+    (-0.15, 0.132, -0.116, 0.077, 2.4),
+    (-0.08, 0.135, -0.115, 0.088, 2.45),
+    (0.00, 0.141, -0.103, 0.101, 2.5),
+    (0.07, 0.136, -0.075, 0.103, 2.5),
+    (0.12, 0.122, -0.044, 0.096, 2.45),
+    (0.16, 0.094, -0.012, 0.087, 2.2),
+    (0.20, 0.060, 0.002, 0.070, 2.0),
     (0.26, 0.040, 0.000, 0.040, 2.0),
 ])  # fmt: skip
 
-SHOULDER = np.array([0.162, 0.024, 0.110])  #: centre of the left humeral head, m
+SHOULDER = np.array([0.160, 0.029, 0.101])  #: centre of the left humeral head, m
 ARM = np.array([0.62, 0.02, -0.78]) / np.linalg.norm([0.62, 0.02, -0.78])  #: along the left arm
 NECK = np.array([0.0, 0.040, 0.150])  #: base of the neck, m
 NECK_AXIS = np.array([0.0, -0.29, 0.957]) / np.linalg.norm([0.29, 0.957])
-BREAST = np.array([0.085, -0.092, -0.008])  #: centre of the left breast's base, m
+BREAST = np.array([0.081, -0.089, -0.013])  #: centre of the left breast's base, m
 _OUT = np.radians(17.0)  # by which breasts look to the side
 BREAST_AXES = np.array([
     (np.cos(_OUT), np.sin(_OUT), 0.0),
     (0.0, 0.0, 1.0),
     (np.sin(_OUT), -np.cos(_OUT), 0.0),
 ])  #: rows: to the side, up, to the front of the left breast  # fmt: skip
-NIPPLE = np.array([0.008, -0.009, 0.0550])  #: in the breast's axes, m
+NIPPLE = np.array([0.0080, -0.0090, 0.0540])  #: in the breast's axes, m
+
+#: Ends (m) and radii (m) of the cones along collar bone, trapezius, neck, pectoral and upper arm.
+_COLLAR = ((0.022, 0.034, 0.122), (0.146, 0.031, 0.102), 0.045, 0.042)
+_TRAPEZIUS = ((0.011, 0.055, 0.191), (0.147, 0.044, 0.108), 0.028, 0.032)
+_NECK = ((0.0, 0.031, 0.119), (0.0, -0.053, 0.388), 0.049, 0.0485)
+_PECTORAL = ((0.109, -0.031, 0.078), (0.185, -0.001, 0.071), 0.030, 0.032)
+_UPPER_ARM = (0.047, 0.041)
+_DELTOID = (0.047, 0.053, 0.085)  # half axes, m
+#: Middles and half axes of the breast's lower pole and of its upper slope, in its axes, m.
+_POLE = ((0.002, -0.009, 0.001), (0.058, 0.051, 0.051))
+_SLOPE = ((-0.002, 0.023, -0.034), (0.058, 0.070, 0.045))
 
 
 def level(points: Floats) -> Floats:
@@ -54,7 +65,7 @@ def level(points: Floats) -> Floats:
     body = smooth_min(trunk(p), shoulder_girdle(p), 0.05)
     body = smooth_min(body, neck(p), 0.035)
     # the armpit is a narrow cleft, the front of the shoulder a soft hollow
-    softness = 0.024 + 0.016 / (1 + np.exp(-(p[:, 2] - 0.075) / 0.010))
+    softness = 0.024 + 0.016 / (1 + np.exp(-(p[:, 2] - 0.072) / 0.010))
     body = smooth_min(body, arm(p), softness)
     body = smooth_min(body, pectoral(p), 0.030)
     return smooth_min(body, *breast(p))
@@ -101,8 +112,8 @@ def trunk(p: Floats) -> Floats:
 
 def _furrows(p: Floats) -> Floats:
     behind = 1 / (1 + np.exp(-(p[:, 1] - 0.02) / 0.015))
-    spine = 0.009 * np.exp(-((p[:, 0] / 0.022) ** 2)) * np.exp(-(((p[:, 2] + 0.07) / 0.15) ** 4))
-    sternum = 0.004 * np.exp(-((p[:, 0] / 0.03) ** 2)) * np.exp(-(((p[:, 2] - 0.03) / 0.09) ** 4))
+    spine = 0.012 * np.exp(-((p[:, 0] / 0.028) ** 2)) * np.exp(-(((p[:, 2] + 0.07) / 0.15) ** 4))
+    sternum = 0.003 * np.exp(-((p[:, 0] / 0.03) ** 2)) * np.exp(-(((p[:, 2] - 0.03) / 0.09) ** 4))
     return np.asarray(spine * behind + sternum * (1 - behind))
 
 
@@ -115,27 +126,24 @@ def _profile() -> CubicSpline:
 
 def shoulder_girdle(p: Floats) -> Floats:
     """From the neck's base over the clavicle and the trapezius to the acromion."""
-    collar = cone(p, (0.020, 0.030, 0.132), (0.150, 0.028, 0.116), 0.046, 0.042)
-    slope = cone(p, (0.010, 0.052, 0.222), (0.150, 0.040, 0.124), 0.030, 0.033)
-    return smooth_min(collar, slope, 0.04)
+    return smooth_min(cone(p, *_COLLAR), cone(p, *_TRAPEZIUS), 0.04)
 
 
 def neck(p: Floats) -> Floats:
     """A slightly flat, forward-leaning cylinder."""
-    base = np.array([0.0, 0.028, 0.120])
-    return cone(p, tuple(base), tuple(base + 0.28 * NECK_AXIS), 0.055, 0.0515)
+    return cone(p, *_NECK)
 
 
 def arm(p: Floats) -> Floats:
     """Deltoid and upper arm, |x| taken."""
-    upper = cone(p, tuple(SHOULDER), tuple(SHOULDER + 0.30 * ARM), 0.048, 0.041)
-    deltoid = ellipsoid(p - (SHOULDER + 0.040 * ARM), (0.048, 0.053, 0.086))
+    upper = cone(p, tuple(SHOULDER), tuple(SHOULDER + 0.30 * ARM), *_UPPER_ARM)
+    deltoid = ellipsoid(p - (SHOULDER + 0.040 * ARM), _DELTOID)
     return smooth_min(upper, deltoid, 0.015)
 
 
 def pectoral(p: Floats) -> Floats:
     """The muscle's edge from chest to arm, which makes the fold before the armpit."""
-    return cone(p, (0.105, -0.036, 0.082), (0.185, -0.004, 0.076), 0.032, 0.034)
+    return cone(p, *_PECTORAL)
 
 
 def breast(p: Floats) -> tuple[Floats, Floats]:
@@ -144,12 +152,11 @@ def breast(p: Floats) -> tuple[Floats, Floats]:
     The lower fold is sharp; above, the breast fades into the chest.
     """
     q = (p - BREAST) @ BREAST_AXES.T
-    pole = ellipsoid(q - (0.003, -0.009, 0.0), (0.060, 0.051, 0.051))
-    slope = ellipsoid(q - (-0.002, 0.027, -0.030), (0.058, 0.075, 0.046))
+    pole, slope = (ellipsoid(q - middle, radii) for middle, radii in (_POLE, _SLOPE))
     mound = smooth_min(pole, slope, 0.05)
     areola = ellipsoid(q - NIPPLE + (0.0, 0.0, 0.006), (0.016, 0.016, 0.006))
     nipple = np.linalg.norm(q - NIPPLE + (0.0, 0.0, 0.003), axis=1) - 0.0055
-    softness = 0.021 + 0.055 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
+    softness = 0.015 + 0.044 / (1 + np.exp(-(q[:, 1] - 0.020) / 0.018))
     return smooth_min(smooth_min(mound, areola, 0.008), nipple, 0.006), softness
 
 

@@ -23,6 +23,8 @@ _RINGS = {
     "girdle": (0.150, (150, 180)),
 }
 _RADIUS, _HEIGHT = 0.105, 0.008  # of a swelling, m
+#: Those near the armpit's cleft, where normals turn within few mm, are less high, m.
+_LOW = {"chest_75": 0.005}
 #: Places on the left arm: along it from the shoulder, m, and angles from its outside to its front.
 _ARM_PLACES = ((0.08, (0, 90, 270)), (0.16, (0, 90, 180, 270)))
 _ARM_RADIUS = 0.065
@@ -36,7 +38,8 @@ def bumps() -> dict[str, Field]:
     made: dict[str, Field] = {}
     for (ring, _, angle), middle in zip(places, middles, strict=True):
         side = "" if angle in (0, 180) else "_left"
-        made[f"{ring}_{angle}{side}"] = trunk_bump(middle, (_RADIUS,) * 3, _HEIGHT)
+        height = _LOW.get(f"{ring}_{angle}", _HEIGHT)
+        made[f"{ring}_{angle}{side}"] = trunk_bump(middle, (_RADIUS,) * 3, height)
     for along, angles in _ARM_PLACES:
         for angle in angles:
             name = f"arm_{round(1000 * along)}_{angle}_left"

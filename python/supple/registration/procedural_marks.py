@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import numpy.typing as npt
 
@@ -36,7 +34,7 @@ def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
     apex = _saddle(armpit(skin.points, skin.triangles))
     front = fold_before(_section(apex, -0.01, 0.08), apex)
     by_shape = {"breast_inferior_left": fold[None], "axilla_left": front[None]}
-    for name, points in {**_left_places(), **by_shape}.items():
+    for name, points in {**_left_places(fold), **by_shape}.items():
         found[name] = _nearest(skin, points, closed=name == "breast_left")
         found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
     return {name: found[name] for name in LANDMARKS}, {name: found[name] for name in CURVES}
@@ -112,11 +110,16 @@ def _nearest(skin: Skin, points: Floats, closed: bool = False) -> OnSurface:
     )
 
 
-@cache
-def _left_places() -> dict[str, Floats]:
-    """Points (k, 3) m of the left: of each landmark and of the breast's outline."""
+def _left_places(fold: Floats) -> dict[str, Floats]:
+    """Points (k, 3) m of the left: of each landmark and of the breast's outline.
+
+    Above, the outline is the base's; below, the half ellipse through the ``fold`` (3,) m.
+    """
     outline = np.pi + np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    on_base = BASE + BASE_RADII * np.stack([np.cos(outline), np.sin(outline)], axis=1)
+    aside, under = (fold - body.BREAST) @ body.BREAST_AXES[:2].T - BASE
+    low = abs(under) / np.sqrt(1 - (aside / BASE_RADII[0]) ** 2)
+    up = np.where(np.sin(outline) < 0, low, BASE_RADII[1])
+    on_base = BASE + np.stack([BASE_RADII[0] * np.cos(outline), up * np.sin(outline)], axis=1)
     start = body.BREAST + on_base @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
     line = body.met(start, -body.BREAST_AXES[2])
     nipple = body.nipple()

@@ -16,9 +16,9 @@ from supple.signals import signals_kept
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-ARM_END, NECK_END, WAIST_END = 0.170, 0.112, -0.300  #: cuts: along arm and neck, and a height, m
+ARM_END, NECK_END, WAIST_END = 0.164, 0.092, -0.300  #: cuts: along arm and neck, and a height, m
 _CELL = 0.010  # of marching cubes, m
-_NOTCH = np.array([0.0, -0.042, 0.155])  # where the profile turns sharply, m
+_NOTCH = np.array([0.0, -0.037, 0.150])  # where the profile turns sharply, m
 _ARMPIT = np.array([0.148, 0.022, 0.036])  # where weights change within few edges, m
 _LOW, _HIGH = (-0.17, -0.32), (0.15, 0.28)  # the box in y and z; x from 0 to 0.33
 

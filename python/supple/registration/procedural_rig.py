@@ -22,6 +22,9 @@ _JOINTS = {
 #: The breast's base: middle and half axes, m, to the side and up, in its axes.
 BASE, BASE_RADII = np.array([0.002, 0.010]), np.array([0.064, 0.072])
 
+#: m; the arm takes the skin of the chest along, for pectoralis and dorsi end on it.
+_SKIN = (0.074, 0.115)
+
 
 def bones() -> tuple[Bone, ...]:
     """The nine, parents before children."""
@@ -36,7 +39,7 @@ def _joint(name: str) -> tuple[float, float, float]:
 def weights(points: Floats) -> Floats:
     """(n, 9) of the bones at ``points`` (n, 3) m: ≥ 0, rows sum to 1, smooth in the place."""
     p = left(points)
-    arm, rest = _split(np.ones(len(p)), arm_part(p))
+    arm, rest = _split(np.ones(len(p)), arm_part(p, *_SKIN))
     girdle = smooth((p[:, 0] - 0.045) / 0.09) * smooth((p[:, 2] - 0.04) / 0.10)
     shoulder, rest = _split(rest, girdle)
     neck, rest = _split(rest, smooth(((p - body.NECK) @ body.NECK_AXIS + 0.005) / 0.08))
@@ -71,10 +74,14 @@ def smooth(t: Floats) -> Floats:
     return np.asarray(np.clip(t**3 * (10 - 15 * t + 6 * t**2), 0, 1))  # above 1 by rounding else
 
 
-def arm_part(p: Floats) -> Floats:
-    """How much (n,) each point on the left belongs to the arm: by its place along and off it."""
+def arm_part(p: Floats, reach: float = 0.014, fade: float = 0.07) -> Floats:
+    """How much (n,) each point on the left belongs to the arm: by its place along and off it.
+
+    From ``reach`` m nearer to the trunk than to the arm on, over a way of ``fade`` m.
+    """
     along = (p - body.SHOULDER) @ body.ARM
-    return smooth((along + 0.05) / 0.12) * smooth((body.trunk(p) - body.arm(p) + 0.014) / 0.07)
+    off = body.trunk(p) - body.arm(p)
+    return smooth((along + 0.05) / 0.12) * smooth((off + reach) / fade)
 
 
 def breast_radius(p: Floats) -> Floats:

@@ -28,6 +28,7 @@ _TIGHTER = {
     "chest_0": (-4.0, 2.5),
     "breast_lower_pole": (-3.0, 4.0),
     "breast_fold": (-2.5, 4.0),
+    "ribs_110": (-4.0, 3.0),
 }
 
 

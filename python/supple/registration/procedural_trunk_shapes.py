@@ -80,7 +80,7 @@ TRUNK_SHAPES: dict[str, Field] = {
     "pectoral_left": bump((0.10, -0.055, 0.10), (0.07, 0.06, 0.06), 0.008),
     "axilla_front_left": bump((0.155, -0.035, 0.065), (0.045, 0.05, 0.05), 0.008),
     "axilla_back_left": bump((0.155, 0.06, 0.055), (0.05, 0.05, 0.06), 0.009),
-    "axilla_side_left": trunk_bump((0.15, 0.01, 0.02), (0.06, 0.07, 0.07), 0.006),
+    "axilla_side_left": trunk_bump((0.15, 0.01, 0.02), (0.06, 0.07, 0.07), 0.0028),
     "arm_girth_left": _arm(0.0, 0.12, 0.12),
     "arm_ellipse_left": _arm(0.0, 0.10, -0.10),
     "arm_length_left": _arm(0.12, 0.0, 0.0),
