@@ -16,7 +16,7 @@ def test_no_body_judges_that_taught_or_is_of_the_acceptance() -> None:
 
 @pytest.mark.slow
 def test_bodies_of_the_template_teach_it_no_harm() -> None:
-    """Its own bodies are in its prior already: the skin stays within 1.2 mm, no landmark is lost."""
+    """They are in its prior already: the skin stays within 1.2 mm, landmarks where they were."""
     found = list(rows("procedural", "procedural", templates(), [2001], [1000]))
     assert [row["prior"] for row in found] == 4 * ["assumed", "learnt"]
     means = summary(found)
