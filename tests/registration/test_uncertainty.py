@@ -16,6 +16,7 @@ from supple.registration.uncertainty import (
     inflation,
     jacobian,
     radius,
+    slid,
     uncertainty_at,
     vertex_uncertainty,
 )
@@ -118,3 +119,11 @@ def test_inflation_finds_the_integral_of_a_field_s_covariance(length, white):
         whole += 2 * np.pi * length**2 * sd**2
     found = inflation(points, residuals, patch=0.015, assumed=2e-3)
     assert found == pytest.approx(whole / (0.015**2 * 2e-3**2), rel=0.4)
+
+
+def test_only_a_body_sized_unlike_the_template_slides():
+    """Bones of the template's sizes add nothing; the further from them, the wider, up to √10."""
+    assert slid(0.0) == slid(0.1) == 1.0
+    grown = [slid(sizes) for sizes in np.linspace(0.0, 2.0, 50)]
+    assert (np.diff(grown) >= 0).all()
+    assert grown[-1] == slid(np.inf) == 10.0

@@ -22,9 +22,9 @@ class Doubts:
     residual: float = 6e-3  #: robust sd of scan to skin
     on_skin: float = 0.5  #: least share of the scan that is the body's
     seen: float = 0.35  #: least share of the skin of the breasts, and of the front, that is seen
-    sd: float = 12e-3  #: largest mean standard deviation of the breasts' vertices
+    sd: float = 10e-3  #: largest mean standard deviation of the breasts' vertices
     rival: float = 1.2  #: more must speak against the next facing than the best, by this factor
-    offset: float = 3e-3  #: largest rms by which seen skin leaves what bones and shapes can do
+    offset: float = 1.5e-3  #: largest rms by which seen skin leaves what bones and shapes can do
     shape: float = 13.0  #: largest distance of all shapes together, in standard deviations
     sizes: float = 1.2  #: largest rms of the bones' scales, in standard deviations
     turns: float = 1.0  #: largest rms of the bones' turns against their parents, likewise
@@ -65,7 +65,7 @@ def doubts(
         f"Only {used:.0%} of the scan are this body's skin, less than {limits.on_skin:.0%}; "
         "cut away what is not the torso.": used < limits.on_skin,
         f"The standard deviation of the breasts is {1e3 * sd:.0f} mm, more than "
-        f"{1e3 * limits.sd:.0f} mm; scan more of the front.": sd > limits.sd,
+        f"{1e3 * limits.sd:.0f} mm; scan more of the front, or give landmarks.": sd > limits.sd,
         f"{bounds:.0%} of the shapes are at their bounds, more than {limits.at_bounds:.0%}; "
         "the body is unlike any that the template can be.": bounds > limits.at_bounds,
         f"A body that faces another way is nearly as plausible ({ratio:.2f} times the energy, less "
