@@ -166,7 +166,3 @@ TEST(a_turned_shifted_and_grown_shape_is_found_again) {
   one[0].shape = 1;
   CHECK_THROWS(descend(shapes, scan, normals, true, {}, one), ShapeError);
 }
-
-int main() {
-  return run_tests();
-}
