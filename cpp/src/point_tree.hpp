@@ -38,6 +38,24 @@ class PointTree {
     return best;
   }
 
+  /// use(first, last) for each leaf, whose points stand at first ≤ k < last in `order`.
+  template <class Use>
+  void each_leaf(const Use& use) const {
+    for (const Node& node : nodes_)
+      if (node.right < 0) use(node.begin, node.end);
+  }
+
+  /// The point that stands at k in `order`.
+  const Eigen::Vector3d& at(int k) const { return points_[static_cast<std::size_t>(k)]; }
+
+  /// use(k) for all places k in `order` of leaves that come within `radius` of the box, and so for
+  /// all points that do.
+  template <class Use>
+  void near_box(const Eigen::Vector3d& low, const Eigen::Vector3d& high, double radius,
+                const Use& use) const {
+    if (!nodes_.empty()) visit_box(0, low, high, radius, use);
+  }
+
   /// use(number of the point, its squared distance) for all within √limit of q.
   template <class Use>
   void within(const Eigen::Vector3d& q, double limit, const Use& use) const {
@@ -106,6 +124,19 @@ class PointTree {
     const double offset = q[node.axis] - node.split;
     if (offset <= 0.0 || offset * offset <= limit) visit_within(number + 1, q, limit, use);
     if (offset >= 0.0 || offset * offset <= limit) visit_within(node.right, q, limit, use);
+  }
+
+  template <class Use>
+  void visit_box(int number, const Eigen::Vector3d& low, const Eigen::Vector3d& high, double radius,
+                 const Use& use) const {
+    const Node& node = nodes_[static_cast<std::size_t>(number)];
+    if (node.right < 0) {
+      for (int k = node.begin; k < node.end; ++k)
+        use(k);
+      return;
+    }
+    if (low[node.axis] - radius <= node.split) visit_box(number + 1, low, high, radius, use);
+    if (high[node.axis] + radius >= node.split) visit_box(node.right, low, high, radius, use);
   }
 
   std::vector<int> order_;

@@ -9,67 +9,143 @@ namespace {
 using Vec3 = Eigen::Vector3d;
 using Index = Eigen::Index;
 constexpr double kPi = 3.14159265358979323846;
-/// Points whose links are kept together.
-constexpr Index kPart = 256;
+/// Leaves of the tree whose links are kept together.
+constexpr std::size_t kPart = 32;
+constexpr std::size_t kLanes = 8;
+using Lanes = double __attribute__((vector_size(8 * kLanes)));
 
-/// Moments of the points around one, about it.
-struct Moments {
-  double all = 0.0;
-  int count = 0;
-  Vec3 sum = Vec3::Zero(), plain = Vec3::Zero(); ///< by what they hold, and each alike
-  double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
+double total(const Lanes& lanes) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < kLanes; ++k)
+    sum += lanes[k];
+  return sum;
+}
 
-  void add(const Vec3& offset, double held) {
-    const Vec3 weighted = held * offset;
-    sum += weighted;
-    plain += offset;
-    xx += weighted[0] * offset[0];
-    xy += weighted[0] * offset[1];
-    xz += weighted[0] * offset[2];
-    yy += weighted[1] * offset[1];
-    yz += weighted[1] * offset[2];
-    zz += weighted[2] * offset[2];
-    all += held;
-    ++count;
+/// The points around the few of a leaf, eight at a time.
+class Near {
+ public:
+  void gather(const PointTree& tree, const Eigen::VectorXd& held, int first, int last,
+              double radius) {
+    Vec3 low = tree.at(first), high = low;
+    for (int k = first + 1; k < last; ++k) {
+      low = low.cwiseMin(tree.at(k));
+      high = high.cwiseMax(tree.at(k));
+    }
+    clear();
+    tree.near_box(low, high, radius, [&](int k) {
+      const Vec3& p = tree.at(k);
+      const double far = (low - p).cwiseMax(p - high).cwiseMax(0.0).squaredNorm();
+      const int number = tree.order()[static_cast<std::size_t>(k)];
+      if (far <= radius * radius) add(p, held[number], number);
+    });
   }
-  Eigen::Matrix3d covariance(const Vec3& mean) const {
+
+  /// Moments of those within `radius` of `centre`, about it.
+  struct Moments {
+    double all = 0.0, count = 0.0;
+    Vec3 sum, plain; ///< by what they hold, and each alike
     Eigen::Matrix3d second;
-    second << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-    return second / all - mean * mean.transpose();
+  };
+  /// link(number) of those within `gap`.
+  template <class Link>
+  Moments moments(const Vec3& centre, double radius, double gap, const Link& link) const {
+    Lanes all{}, count{}, sum[3]{}, plain[3]{}, second[6]{};
+    for (std::size_t i = 0; i < held_.size(); ++i) {
+      Lanes d[3];
+      for (std::size_t c = 0; c < 3; ++c)
+        d[c] = at_[c][i] - centre[static_cast<Index>(c)];
+      const Lanes squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+      const auto within = squared <= radius * radius;
+      const Lanes weight = within ? held_[i] : Lanes{}, one = within ? Lanes{} + 1.0 : Lanes{};
+      all += weight;
+      count += one;
+      std::size_t to = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Lanes weighted = weight * d[c];
+        sum[c] += weighted;
+        plain[c] += one * d[c];
+        for (std::size_t e = c; e < 3; ++e)
+          second[to++] += weighted * d[e];
+      }
+      for (std::size_t k = 0; k < kLanes; ++k)
+        if (squared[k] <= gap * gap) link(number_[i * kLanes + k]);
+    }
+    Moments m{total(all), total(count), Vec3::Zero(), Vec3::Zero(), Eigen::Matrix3d::Zero()};
+    std::size_t from = 0;
+    for (int c = 0; c < 3; ++c) {
+      m.sum[c] = total(sum[c]);
+      m.plain[c] = total(plain[c]);
+      for (int e = c; e < 3; ++e)
+        m.second(c, e) = m.second(e, c) = total(second[from++]);
+    }
+    return m;
   }
+
+ private:
+  void clear() {
+    for (auto& axis : at_)
+      axis.clear();
+    held_.clear();
+    number_.clear();
+  }
+  void add(const Vec3& p, double held, int number) {
+    const std::size_t lane = number_.size() % kLanes;
+    if (lane == 0) { // lanes that are left are far away
+      for (auto& axis : at_)
+        axis.push_back(Lanes{} + 1e9);
+      held_.push_back(Lanes{});
+    }
+    for (std::size_t c = 0; c < 3; ++c)
+      at_[c].back()[lane] = p[static_cast<Index>(c)];
+    held_.back()[lane] = held;
+    number_.push_back(number);
+  }
+
+  std::array<std::vector<Lanes>, 3> at_;
+  std::vector<Lanes> held_;
+  std::vector<int> number_;
 };
+
+void describe(const Near::Moments& m, double radius, Index i, Around& found) {
+  const Vec3 mean = m.sum / m.all;
+  if (m.count >= 4.0) {
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread;
+    spread.computeDirect(m.second / m.all - mean * mean.transpose());
+    found.normal.row(i) = spread.eigenvectors().col(0).transpose();
+    found.dip[i] = mean.dot(spread.eigenvectors().col(0));
+  }
+  const double aside = m.plain.norm() / m.count / radius;
+  found.share[i] = kPi * radius * radius * std::max(1.0 - 1.18 * aside, 0.3) / m.count;
+  found.border[static_cast<std::size_t>(i)] = m.count < 4.0 || aside > 0.28;
+}
 
 } // namespace
 
 Around look_around(const Points& points, const Eigen::VectorXd& held, const PointTree& tree,
                    double radius, double gap) {
-  const Index n = points.rows(), parts = (n + kPart - 1) / kPart;
+  const Index n = points.rows();
+  std::vector<std::array<int, 2>> leaves;
+  tree.each_leaf([&](int first, int last) { leaves.push_back({first, last}); });
+  const std::size_t parts = (leaves.size() + kPart - 1) / kPart;
   Around found{Points::Zero(n, 3), Eigen::VectorXd(n),
                std::vector<char>(static_cast<std::size_t>(n)), Eigen::VectorXd::Zero(n),
-               std::vector<std::vector<std::array<int, 2>>>(static_cast<std::size_t>(parts))};
-  const auto look = [&](Index i, std::vector<std::array<int, 2>>& links) {
-    const Vec3 centre = points.row(i).transpose();
-    Moments moments;
-    tree.within(centre, radius * radius, [&](int j, double squared) {
-      moments.add(points.row(j).transpose() - centre, held[j]);
-      if (j < i && squared <= gap * gap) links.push_back({static_cast<int>(i), j});
-    });
-    const Vec3 mean = moments.sum / moments.all;
-    if (moments.count >= 4) {
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread;
-      spread.computeDirect(moments.covariance(mean));
-      found.normal.row(i) = spread.eigenvectors().col(0).transpose();
-      found.dip[i] = mean.dot(spread.eigenvectors().col(0));
-    }
-    const double aside = moments.plain.norm() / moments.count / radius;
-    found.share[i] = kPi * radius * radius * std::max(1.0 - 1.18 * aside, 0.3) / moments.count;
-    found.border[static_cast<std::size_t>(i)] = moments.count < 4 || aside > 0.28;
-  };
-#pragma omp parallel for schedule(dynamic, 1)
-  for (Index part = 0; part < parts; ++part)
-    for (Index k = part * kPart; k < std::min(n, (part + 1) * kPart); ++k)
-      look(tree.order()[static_cast<std::size_t>(k)], // neighbours one after the other
-           found.links[static_cast<std::size_t>(part)]);
+               std::vector<std::vector<std::array<int, 2>>>(parts)};
+#pragma omp parallel
+  {
+    Near near;
+#pragma omp for schedule(dynamic, 1)
+    for (std::size_t part = 0; part < parts; ++part)
+      for (std::size_t l = part * kPart; l < std::min(leaves.size(), (part + 1) * kPart); ++l) {
+        near.gather(tree, held, leaves[l][0], leaves[l][1], radius);
+        for (int k = leaves[l][0]; k < leaves[l][1]; ++k) {
+          const int i = tree.order()[static_cast<std::size_t>(k)];
+          const auto link = [&](int j) {
+            if (j < i) found.links[part].push_back({i, j});
+          };
+          describe(near.moments(tree.at(k), radius, gap, link), radius, i, found);
+        }
+      }
+  }
   return found;
 }
 

@@ -60,7 +60,7 @@ class NormalSum {
            Unknowns of = Unknowns::All);
 
  private:
-  static constexpr int kSums = 4, kChunk = 192;
+  static constexpr int kSums = 4, kChunk = 96;
   struct Part {
     Eigen::MatrixXd matrix, panel, product;
     Eigen::VectorXd gradient, residual, step;

@@ -21,9 +21,10 @@ class Voxels {
  public:
   Voxels(const Points& points, double size) : of_(static_cast<std::size_t>(points.rows())) {
     const Vec3 low = points.colwise().minCoeff().transpose();
+    const double per_size = 1.0 / size;
     std::uint64_t last = kFree;
     for (std::size_t i = 0; i < of_.size(); ++i) {
-      const Vec3 cell = (points.row(static_cast<Index>(i)).transpose() - low) / size;
+      const Vec3 cell = (points.row(static_cast<Index>(i)).transpose() - low) * per_size;
       const std::uint64_t key = static_cast<std::uint64_t>(cell[0]) |
                                 static_cast<std::uint64_t>(cell[1]) << 21 |
                                 static_cast<std::uint64_t>(cell[2]) << 42;

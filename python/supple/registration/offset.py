@@ -27,7 +27,7 @@ class OffsetSettings:
     most: float = 6e-3  #: and at most; between them, what the fit leaves on patches of skin
     noise: float = 1.5e-3  #: of a patch
     patch: float = 15e-3  #: its side
-    rounds: int = 3  #: of new partners
+    rounds: int = 2  #: of new partners
     reach: float = 25e-3  #: partners further away are none
 
 

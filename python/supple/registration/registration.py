@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from supple.core import core
 from supple.registration.posture import Posture
 from supple.registration.template import Floats, Ints, Template
 from supple.surface import Surface
@@ -98,7 +99,9 @@ class Registration:
         """(n,) m, over the three axes; of the displacement along the normal a third each."""
         if self.offset_precision is None:
             return np.zeros(len(self.points))
-        variance = np.diagonal(np.linalg.inv(self.offset_precision.toarray()))
+        precision = self.offset_precision.toarray()
+        # not by NumPy: bits of a BLAS change with the number of its threads
+        variance = np.diagonal(core().inverse_sum(precision, np.zeros_like(precision)))
         return np.asarray(np.sqrt(variance / 3))
 
     @property

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -110,18 +112,25 @@ def priors_in_core(priors: Priors, template: Template) -> Any:
         if getattr(priors, name) is not None:
             setattr(made, name, np.asarray(getattr(priors, name), dtype=np.float64).ravel())
     if priors.blend_covariance is not None:
-        made.blend_precision = _inverse(np.asarray(priors.blend_covariance, dtype=np.float64))
+        covariance = np.ascontiguousarray(priors.blend_covariance, dtype=np.float64)
+        made.blend_precision = _inverse(covariance.tobytes())
     if priors.bounded:
         made.blend_lower, made.blend_upper = template.blendshape_bounds.T
     made.scale_lower, made.scale_upper = priors.scale_bounds
     return made
 
 
-def _inverse(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """By the core: a BLAS' threads would wait, busy, in the way of the fit's own."""
-    if not covariance.size:
-        return covariance
-    inverse = core().inverse_sum(covariance, np.zeros_like(covariance))
+@lru_cache(maxsize=4)
+def _inverse(covariance: bytes) -> npt.NDArray[np.float64]:
+    """Of a square matrix of doubles, once for all fits of a registration.
+
+    By the core: a BLAS' threads would wait, busy, in the way of the fit's own.
+    """
+    matrix = np.frombuffer(covariance)
+    if not matrix.size:
+        return matrix.reshape(0, 0)
+    matrix = matrix.reshape(math.isqrt(matrix.size), -1)
+    inverse = core().inverse_sum(matrix, np.zeros_like(matrix))
     if not len(inverse):
         raise InputError("blend_covariance must be positive definite; give a larger variance.")
     return np.asarray(inverse)
