@@ -47,9 +47,10 @@ def register(
     """Fit a torso to SCAN, in any pose, and carry the surgeon's drawing onto it.
 
     SCAN is PLY, OBJ, STL, OFF, glTF, VTK or VTP, in any unit, of the front at least, from neck to
-    waist. No landmarks are needed; those of a file are used, and compared with. Writes registered.ply,
-    drawing.ply, .obj and .glb, landmarks.mrk.json and .fcsv, parameters.json, table.csv,
-    picture.png, report.html and result.json to --out (default: out/ and the name of the scan).
+    waist. No landmarks are needed; those of a file are used, and compared with. Writes
+    registered.ply, drawing.ply, .obj and .glb, landmarks.mrk.json and .fcsv, parameters.json,
+    table.csv, picture.png, report.html and result.json to --out (default: out/ and the name of the
+    scan).
     Exits with 3 where the fit is not to be trusted. Research use only.
 
     --study draws the errors against landmarks given, blendshapes kept and each weight of the
