@@ -115,6 +115,16 @@ def test_a_landmark_slid_along_the_skin_is_named_with_its_distance(wrong: str) -
     assert not found.trustworthy
 
 
+def test_two_landmarks_alone_that_are_exchanged_are_told_by_the_scan() -> None:
+    """Notch and xiphoid make no triangle: only a fit without them knows which is above."""
+    marks = _scan().truth.landmarks
+    given = {"sternal_notch": marks["xiphoid"], "xiphoid": marks["sternal_notch"]}
+    found = register(_scan().surface, _template(), given)
+    assert found.warnings[0].startswith("It looks as if sternal_notch and xiphoid are exchanged")
+    assert not [w for w in found.warnings if "too small" in w or "too large" in w]
+    assert not found.trustworthy
+
+
 def test_leaving_one_out_on_paper_is_leaving_it_out() -> None:
     """The closed form comes most of the way to a fit without that landmark: it is linear."""
     marks = dict(_scan().truth.landmarks)
