@@ -13,15 +13,19 @@ import SimpleITK as sitk
 import supple
 from supple.breast.breast_case import Case, parse_point, parse_seeds, read_breast_case
 from supple.breast.demo import compare, shortfalls
+from supple.breast.image import read_image
 from supple.breast.phantom import PatientFiles, make_patient
 from supple.breast.predict import (
+    painted_skin,
     predict,
     require_in_breast,
     require_inside,
     require_nipple,
 )
+from supple.breast.segment import segment
 from supple.breast.tetra import BreastMesh
 from supple.breast.tissues import Tissue
+from supple.breast.torso import torso_skin
 from supple.errors import InputError
 
 
@@ -75,6 +79,7 @@ seed = 7
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ('[scan]\nfile = "prone.mha"\nstill = "none.csv"', r"\[scan\] still.*does not exist"),
         ("diametre_mm = 12", "diametre_mm.*diameter_mm"),
         ("[scam]\n", "scam.*scan"),
         ('[scan]\nfile = "none.ply"', r"\[scan\] file.*does not exist"),
@@ -129,6 +134,22 @@ def test_a_scan_in_metres_is_found_out_before_any_work(
     with pytest.raises(InputError, match=r"metres\.ply.*unit='m'"):
         predict(case, lambda name: tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["metres.ply"]
+
+
+def test_painted_skin_is_what_the_scan_is_aligned_by(patient: PatientFiles, tmp_path: Path) -> None:
+    """All skin within 20 mm of one stroke; a stroke off the skin is refused before any work."""
+    case = read_breast_case(patient.case)
+    labels = segment(read_image(case.image).image, case.seeds).labels
+    skin = torso_skin(labels).points
+    x, y, z = 1e3 * skin[len(skin) // 2]
+    painted = replace(case, still=tmp_path / "painted.csv")
+    (tmp_path / "painted.csv").write_text(f"x,y,z,radius\n{x},{y},{z},20\n")
+    near = np.linalg.norm(1e3 * skin - [x, y, z], axis=1) <= 20
+    assert (painted_skin(painted, labels) == near).all()
+    assert painted_skin(case, labels) is None
+    (tmp_path / "painted.csv").write_text("x,y,z\n9000,0,0\n")
+    with pytest.raises(InputError, match=r"brush of painted\.csv must hold points of the skin"):
+        predict(painted, lambda name: tmp_path / name)
 
 
 def test_a_prediction_without_a_scan_writes_all_files_and_says_what_it_assumed(

@@ -15,6 +15,7 @@ from supple.breast.report import ReportData, write_report
 from supple.breast.report_figures import _cut
 from supple.breast.result import Check, MeshFigures, Parameter, Result, Tumour
 from supple.errors import InputError
+from supple.page import thinned
 
 EVIL = '<img src=x onerror=alert(1)> & "patient\'s" </script>'
 DEPTH = {"prone": 0.075, "rest": 0.055, "supine": 0.035}
@@ -162,6 +163,22 @@ def test_a_fine_mesh_still_gives_a_file_under_8_mb(tmp_path: Path) -> None:
     """270,000 nodes are thinned for display; the file stays under 8 MB."""
     write_report(tmp_path / "x.html", report_data(count=300))
     assert (tmp_path / "x.html").stat().st_size < 8e6
+
+
+@pytest.mark.parametrize("most", [10, 300, 5000])
+def test_a_surface_is_thinned_to_nodes_of_its_own_that_cover_it(most: int) -> None:
+    """A square of 100 mm, a node each 2 mm: at most ``most`` are left, none far from the others."""
+    x, y = (g.ravel() for g in np.meshgrid(*[np.arange(0.0, 101.0, 2.0)] * 2))
+    points = np.stack([x - 700, y, 0 * x], axis=1)
+    corner = np.arange(51 * 51).reshape(51, 51)
+    p, q, r, s = (corner[i : 50 + i, j : 50 + j].ravel() for i in (0, 1) for j in (0, 1))
+    triangles = np.vstack([np.stack(t, axis=1) for t in ((p, q, s), (p, s, r))])
+    kept, faces = thinned(points, triangles, most)
+    assert 0.2 * most < len(kept) <= most or len(kept) == len(points)
+    assert faces.max(initial=0) < len(kept)
+    gap = np.linalg.norm(points[:, None] - points[kept][None], axis=2).min(axis=1).max()
+    assert gap < 2 * 100 / len(kept) ** 0.5 * 1.5
+    assert len(thinned(points[:0], triangles[:0], most)[0]) == 0
 
 
 def test_a_plane_cuts_a_tetrahedron_in_a_triangle_of_known_sides() -> None:

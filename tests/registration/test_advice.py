@@ -82,6 +82,18 @@ def test_two_that_are_exchanged_are_named(pose: str) -> None:
     assert set(found.names) == {"sternal_notch", "xiphoid"}
 
 
+@pytest.mark.parametrize("names", [FEW, LANDMARKS[:4], LANDMARKS])
+@pytest.mark.parametrize("pose", POSES)
+def test_a_mirrored_body_is_told_by_three_landmarks(names: Iterable[str], pose: str) -> None:
+    """Mirrored in any plane: what the names call left is on the right."""
+    for seed in (1000, 1001):
+        marks, front = _body(pose, seed)
+        turn = Rotation.random(random_state=seed + 1).as_matrix() @ np.diag([1.0, 1.0, -1.0])
+        found = exchanged({name: turn @ marks[name] for name in names}, turn @ front, _template())
+        assert found is not None
+        assert found.names == ("left", "right")
+
+
 def test_exchanged_names_are_refused_before_the_fit() -> None:
     marks = dict(_scan().truth.landmarks)
     marks["sternal_notch"], marks["xiphoid"] = marks["xiphoid"], marks["sternal_notch"]
@@ -100,6 +112,16 @@ def test_a_landmark_slid_along_the_skin_is_named_with_its_distance(wrong: str) -
     assert len(said) == 1
     assert said[0].startswith(f"Landmark {wrong} was given ")
     assert abs(float(said[0].split()[4]) - 60) < 8
+    assert not found.trustworthy
+
+
+def test_two_landmarks_alone_that_are_exchanged_are_told_by_the_scan() -> None:
+    """Notch and xiphoid make no triangle: only a fit without them knows which is above."""
+    marks = _scan().truth.landmarks
+    given = {"sternal_notch": marks["xiphoid"], "xiphoid": marks["sternal_notch"]}
+    found = register(_scan().surface, _template(), given)
+    assert found.warnings[0].startswith("It looks as if sternal_notch and xiphoid are exchanged")
+    assert not [w for w in found.warnings if "too small" in w or "too large" in w]
     assert not found.trustworthy
 
 

@@ -281,3 +281,28 @@ def test_a_landmark_of_another_body_is_refused_and_one_over_a_hole_is_said():
     hole = {**ON_SCAN, "xiphoid": ON_SCAN["xiphoid"] - [0, 0.03, 0]}
     found = check_on_scan(hole, SCAN)
     assert [s for s in found.said if "'xiphoid' is 3" in s and "mm from the scan" in s]
+
+
+def test_plain_json_of_names_is_read(tmp_path):
+    """{"name": [x, y, z]}, in the unit that it names or that the spread tells."""
+    text = '{"xiphoid": [0, 0, 200], "Nipple L": [90, 0, 150], "unit": "mm", "frame": "RAS"}'
+    found = read(tmp_path, ".json", text)
+    np.testing.assert_allclose(found.points["nipple_left"], [-0.09, 0, 0.15], atol=1e-15)
+    found = read(tmp_path, ".json", '{"xiphoid": [0, 0, 0.2], "nipple_left": [0.09, 0, 0.15]}')
+    np.testing.assert_allclose(found.points["xiphoid"], [0, 0, 0.2])
+    with pytest.raises(InputError, match="'xiphoid' is no list of three numbers"):
+        read(tmp_path, ".json", '{"xiphoid": 3}')
+
+
+def test_decimal_commas_of_a_spreadsheet_are_points(tmp_path):
+    """Where semicolons divide the columns, in any order of these."""
+    found = read(tmp_path, ".csv", "x_mm;y_mm;z_mm;name\n1,5;-2,25;3;xiphoid\n")
+    np.testing.assert_allclose(found.points["xiphoid"], [1.5e-3, -2.25e-3, 3e-3])
+
+
+def test_a_name_that_is_not_known_is_told_with_its_file(tmp_path):
+    """With the names that are near, or all where none is."""
+    with pytest.raises(InputError, match=r"\.csv: no landmark is called 'belly button'; known are"):
+        read(tmp_path, ".csv", "name,x,y,z\nbelly button,1,2,3\n")
+    with pytest.raises(InputError, match=r"\.csv: landmark .* name it 'breast_medial_left'"):
+        read(tmp_path, ".csv", "name,x,y,z\nbrest_mediaal,1,2,3\n")

@@ -128,14 +128,35 @@ def test_the_plan_crosses_templates_where_it_can():
 def test_the_figure_draws_every_sweep(tmp_path, suffix):
     """From rows made by hand: two sweeps, two poses, three levels, a failure."""
     rows = [
-        {"sweep": sweep, "at": at, "pose": pose, "surface_mm": 2.0 / at, "landmark_mm": 9.0 / at,
-         "failed": at == 1}
-        for sweep in ("landmarks", "joint") for pose in ("standing", "supine") for at in (1, 3, 9)
+        {"sweep": sweep, "at": at, "pose": pose, "pair": pair, "shape": 0, "failed": at == 1,
+         "surface_mm": 2.0 / at, "landmark_mm": 9.0 / at / (1 if sweep == "landmarks" else 10)}
+        for sweep in ("landmarks", "joint") for pose in ("standing", "supine")
+        for pair in ("a→b", "b→a") for at in (1, 3, 9)
     ]  # fmt: skip
     path = torso_figure.draw(rows, tmp_path / f"torso.{suffix}")
     assert path.stat().st_size > 5000
     if suffix == "svg":
         assert "λ" in path.read_text(encoding="utf-8") or "joint" in path.read_text("utf-8")
+
+
+def test_no_point_of_a_figure_is_cut_off_and_each_pair_has_its_line(monkeypatch, tmp_path):
+    """The first sweep's errors are ten times the last's, and the axes are shared."""
+    drawn = []
+    monkeypatch.setattr(torso_figure, "save", lambda figure, path: drawn.append(figure) or path)
+    rows = [
+        {"sweep": sweep, "at": at, "pose": "supine", "pair": pair, "shape": 0, "failed": at == 1,
+         "surface_mm": most / at, "landmark_mm": 3 * most / at}
+        for sweep, most in (("scale", 10.0), ("joint", 1.0)) for pair in ("a→b", "b→a")
+        for at in (1, 3)
+    ]  # fmt: skip
+    torso_figure.draw(rows, tmp_path / "torso.png")
+    panels = drawn[0].axes
+    for axes, most in zip(panels, (10, 10, 30, 30), strict=True):
+        assert axes.get_ylim()[0] == 0
+        assert most < axes.get_ylim()[1] < 1.2 * most
+    said = [text.get_text() for text in drawn[0].legends[0].get_texts()]
+    assert len(said) == 3
+    assert said[-1] == "failed: surface > 5 mm or a landmark > 20 mm"
 
 
 @pytest.mark.slow

@@ -44,6 +44,8 @@ class Case:
         labels: label image; None to segment the image.
         scan: supine surface; None to use the materials as they are.
         scan_unit: its unit of length.
+        still: brush file (`brush_region`, mm) of the skin in the image to align the scan by;
+            None for the skin between the breasts and above them.
         nipple_mm: prone nipple of the breast with the tumour; None to estimate it.
         seeds: points known to be in a tissue, mm.
         materials: laws and parameters, where the identification starts.
@@ -60,6 +62,7 @@ class Case:
     labels: Path | None = None
     scan: Path | None = None
     scan_unit: str = "mm"
+    still: Path | None = None
     nipple_mm: Point | None = None
     seeds: dict[Tissue, list[Point]] = field(default_factory=dict)
     materials: Materials = field(default_factory=Materials)
@@ -88,6 +91,7 @@ def read_breast_case(path: str | Path, *, allow_energy_files: bool = False) -> C
         tumour_diameter_mm=_diameter(tumour),
         scan=None if scan is None else scan.path("file"),
         scan_unit="mm" if scan is None else scan.text("unit", "mm", choices=tuple(METRES)),
+        still=None if scan is None or "still" not in scan else scan.path("still"),
         nipple_mm=_point(tumour, "nipple_mm") if "nipple_mm" in tumour else None,
         seeds=_seeds(top.table("seeds")),
         materials=materials,
@@ -106,7 +110,7 @@ def read_breast_case(path: str | Path, *, allow_energy_files: bool = False) -> C
 def with_options(case: Case, **options: Any) -> Case:
     """The case with what was given on the command line in place of what it says itself."""
     given = {name: value for name, value in options.items() if value is not None}
-    for name in ("image", "labels", "scan"):
+    for name in ("image", "labels", "scan", "still"):
         path = given.get(name)
         if path is not None and not path.exists():
             raise InputError(f"{name} {path} does not exist; give an existing path.")

@@ -37,6 +37,7 @@ from supple.breast.tetra import BreastMesh, build_mesh
 from supple.breast.tissues import BREAST
 from supple.breast.torso import torso_skin
 from supple.errors import InputError
+from supple.registration.region_of_interest import brush_region
 from supple.registration.rigid import Alignment, align
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ def predict(case: Case, place: Place, watch: Watch = lambda stage, share: None) 
     with clock("segment"):
         anatomy = _anatomy(case, image.image)
         require_in_breast(anatomy.labels, case.tumour_mm)
+        still = painted_skin(case, anatomy.labels)
     with clock("mesh"):
         mesh = build_mesh(
             anatomy.labels, edge_mm=case.edge_mm, tumour_mm=case.tumour_mm,
@@ -121,7 +123,7 @@ def predict(case: Case, place: Place, watch: Watch = lambda stage, share: None) 
     if scan is not None:
         with clock("align"):
             poses = solve_or_advise(mesh, materials, case.support)
-            registered = _register(scan, anatomy.labels, mesh, poses)
+            registered = _register(scan, anatomy.labels, mesh, poses, still)
         if case.identify.parameters:
             with clock("identify"):
                 identified = _identify(case, mesh, materials, registered, watch)
@@ -217,11 +219,21 @@ def _checked(case: Case, mesh: BreastMesh) -> Materials:
     return case.materials
 
 
+def painted_skin(case: Case, labels: sitk.Image) -> NDArray[np.bool_] | None:
+    """Which points of the torso's skin were painted as still; None where that is automatic."""
+    if case.still is None:
+        return None
+    if case.scan is None:
+        raise InputError("still is the skin by which a scan is aligned; give the scan as well.")
+    return brush_region(torso_skin(labels).points, case.still)
+
+
 def _register(
-    scan: supple.Surface, labels: sitk.Image, mesh: BreastMesh, poses: Poses
-) -> Registered:
+    scan: supple.Surface, labels: sitk.Image, mesh: BreastMesh, poses: Poses,
+    still: NDArray[np.bool_] | None,
+) -> Registered:  # fmt: skip
     torso = torso_skin(labels)
-    alignment = align(scan.points, torso.points, torso.triangles)
+    alignment = align(scan.points, torso.points, torso.triangles, region=still)
     points = alignment.apply(scan.points)
     skin = np.asarray(mesh.skin, dtype=np.int64)
     misfit = SkinMisfit.overlapping(points, poses.points["supine"], skin)

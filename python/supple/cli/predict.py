@@ -24,6 +24,9 @@ _FILE = click.Path(path_type=Path)
 @click.option("--labels", type=_FILE, help="Label image; the default segments the image.")
 @click.option("--scan", type=_FILE, help="Supine surface scan: PLY, STL, OBJ or OFF.")
 @click.option("--scan-unit", type=click.Choice(("mm", "cm", "m")), help="Of the scan; mm.")
+@click.option("--still", type=_FILE, metavar="FILE",
+              help="Skin in the image that does not move, to align the scan by: painted PLY, or "
+                   "CSV of x,y,z,radius in mm; automatic by default.")  # fmt: skip
 @click.option("--seeds", multiple=True, metavar="TISSUE:X,Y,Z",
               help="A point known to be air, fat, gland or chest; may be repeated.")  # fmt: skip
 @click.option("--nipple", metavar="X,Y,Z", help="Prone nipple on the tumour's side, LPS mm.")
@@ -36,6 +39,7 @@ def predict(
     labels: Path | None,
     scan: Path | None,
     scan_unit: str | None,
+    still: Path | None,
     seeds: tuple[str, ...],
     nipple: str | None,
     allow_energy_files: bool,
@@ -59,6 +63,7 @@ def predict(
         labels=labels,
         scan=scan,
         scan_unit=scan_unit,
+        still=still,
         seeds=parse_seeds(seeds) or None,
         nipple_mm=None if nipple is None else parse_point(nipple, "--nipple"),
     )

@@ -24,7 +24,7 @@ _FILE = click.Path(path_type=Path)
 @click.option("--template", type=_FILE, metavar="FILE.glb",
               help="Template; the default is the one that ships.")  # fmt: skip
 @click.option("--landmarks", type=_FILE, metavar="FILE",
-              help="Landmarks on the scan: .fcsv, .mrk.json, .json, .pp or .csv.")  # fmt: skip
+              help="On the scan: .fcsv, .mrk.json, .json, .pp, or .csv of name,x,y,z.")  # fmt: skip
 @click.option("--unit", type=click.Choice(list(METRES)), help="Of the scan; found from its size.")
 @click.option("--start", type=_FILE, metavar="parameters.json",
               help="Of the frame before: the fit starts from there.")  # fmt: skip
@@ -46,10 +46,11 @@ def register(
 ) -> None:
     """Fit a torso to SCAN, in any pose, and carry the surgeon's drawing onto it.
 
-    SCAN is PLY, OBJ, STL, OFF, glTF, VTK or VTP, in mm or m, of the front at least. Landmarks are
-    found on it; those of a file are used as well, and compared with. Writes registered.ply,
-    drawing.ply, .obj and .glb, landmarks.mrk.json and .fcsv, parameters.json, table.csv,
-    picture.png, report.html and result.json to --out (default: out/ and the name of the scan).
+    SCAN is PLY, OBJ, STL, OFF, glTF, VTK or VTP, in any unit, of the front at least, from neck to
+    waist. No landmarks are needed; those of a file are used, and compared with. Writes
+    registered.ply, drawing.ply, .obj and .glb, landmarks.mrk.json and .fcsv, parameters.json,
+    table.csv, picture.png, report.html and result.json to --out (default: out/ and the name of the
+    scan).
     Exits with 3 where the fit is not to be trusted. Research use only.
 
     --study draws the errors against landmarks given, blendshapes kept and each weight of the

@@ -65,14 +65,18 @@ def thinned(points: Floats, triangles: Ints, most: int) -> tuple[Ints, Ints]:
     Returns:
         The nodes that are kept (k,), k ≤ most, and triangles of them.
     """
+    if not len(points):
+        return np.empty(0, dtype=np.int64), np.empty((0, 3), dtype=np.int64)
     size = 1.0
     while True:
-        cell = np.floor(points / size).astype(np.int64)
-        _, first, to = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+        cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
+        rows, columns = cell[:, 1].max() + 1, cell[:, 2].max() + 1
+        key = (cell[:, 0] * rows + cell[:, 1]) * columns + cell[:, 2]
+        _, first, to = np.unique(key, return_index=True, return_inverse=True)
         if len(first) <= most:
             break
-        size *= 1.15
-    tri = to.ravel()[triangles]
+        size *= max(1.15, 0.9 * (len(first) / most) ** 0.5)  # of a surface, by its area
+    tri = to[triangles]
     whole = (tri[:, 0] != tri[:, 1]) & (tri[:, 1] != tri[:, 2]) & (tri[:, 2] != tri[:, 0])
     return first, tri[whole]
 

@@ -6,7 +6,7 @@ the scan, and that a body is of a size that none has.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from supple.registration.body_size import body_size
-from supple.registration.landmark_doubts import misplaced
+from supple.registration.landmark_doubts import misplaced, mistaken
 from supple.registration.template import Template
 from supple.surface import Surface
 
@@ -23,16 +23,21 @@ if TYPE_CHECKING:
 
 
 def advised(
-    found: Registration, landmarks: Mapping[str, npt.ArrayLike] | None, sd: float
-) -> Registration:
-    """With a warning for each landmark that the scan contradicts, and for a size of no body.
+    found: Registration, landmarks: Mapping[str, npt.ArrayLike] | None, sd: float,
+    alone: Callable[[], Registration],
+) -> Registration:  # fmt: skip
+    """With a warning for landmarks that the scan contradicts, or for a size of no body.
 
     Args:
         landmarks: name → (3,) m that were given; they pulled with ``sd`` m.
+        alone: registers the scan without landmarks; called where one is doubted.
     """
     given = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
-    more = [*misplaced(found, given, sd), body_size(found).doubt]
-    more = [sentence for sentence in more if sentence]
+    more = misplaced(found, given, sd)
+    if more:
+        more = mistaken(alone().landmarks, given) or more
+    elif body_size(found).doubt:
+        more = [body_size(found).doubt]
     if not more:
         return found
     return replace(found, warnings=[*more, *found.warnings], trustworthy=False)

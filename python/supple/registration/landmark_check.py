@@ -117,6 +117,9 @@ def _own_names(points: dict[str, Floats], scan: Surface, template: Template) -> 
     """Two landmarks that make a body only when exchanged are refused."""
     front = _front(np.array(list(points.values())), scan)
     found = exchanged(points, front, template)
+    if found is not None and found.names == ("left", "right"):
+        raise InputError("left and right of the landmarks are swapped, or the scan is mirrored; "
+                         "correct the names or the scan.")  # fmt: skip
     if found is not None:
         a, b = found.names
         raise InputError(

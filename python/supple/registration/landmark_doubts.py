@@ -7,6 +7,7 @@ far off it would be had it not been given follows from the fit's own matrices.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 #: A landmark is doubted that is so far, m, from where the scan and the others have it, and so many
 #: times as far as those are on the median: bodies that the template cannot become are 25 mm off.
 _FAR, _TIMES = 35e-3, 1.8
+#: Exchanged, two landmarks must be so much nearer to where the scan has them.
+_CROSSED = 0.4
 
 
 def left_out(registration: Registration, given: Mapping[str, Floats], sd: float) -> Floats:
@@ -68,3 +71,23 @@ def misplaced(registration: Registration, given: Mapping[str, Floats], sd: float
         f"Landmark {names[worst]} was given {off[worst] * 1e3:.0f} mm from where the scan and the "
         "other landmarks have it; check it, or leave it out."
     ]
+
+
+def mistaken(marks: Mapping[str, Floats], given: Mapping[str, Floats]) -> list[str]:
+    """A sentence on two landmarks that are each nearer to where the other belongs.
+
+    Args:
+        marks: name → (3,) m of a fit that did not see ``given``.
+    """
+    for a, b in combinations(given, 2):
+        own = _apart(given[a], marks[a]) + _apart(given[b], marks[b])
+        crossed = _apart(given[a], marks[b]) + _apart(given[b], marks[a])
+        if own > 2 * _FAR and crossed < _CROSSED * own:
+            return [f"It looks as if {a} and {b} are exchanged: they were given "
+                    f"{own * 5e2:.0f} mm from where the scan alone has them, exchanged "
+                    f"{crossed * 5e2:.0f} mm; correct the names."]  # fmt: skip
+    return []
+
+
+def _apart(a: Floats, b: Floats) -> float:
+    return float(np.linalg.norm(a - b))

@@ -27,7 +27,7 @@ _NEARER, _LIKE = 0.6, 35e-3
 class Exchange:
     """Two landmarks that fit a body better when they are exchanged."""
 
-    names: tuple[str, str]
+    names: tuple[str, str]  #: or "left" and "right", of all of them
     given: float  #: m, rms distance from a body's landmarks as they are named
     exchanged: float  #: m, with the two exchanged
 
@@ -54,7 +54,18 @@ def exchanged(
         off = _apart(bodies, _with_front(at[order], front))
         if off < best.exchanged:
             best = Exchange((names[i], names[j]), given, off)
+    off = _apart(_bodies(template, [_opposite(name) for name in names]), _with_front(at, front))
+    if off < best.exchanged:
+        best = Exchange(("left", "right"), given, off)
     return best if best.exchanged < min(_NEARER * given, _LIKE) else None
+
+
+def _opposite(name: str) -> str:
+    """The landmark's name on the other side."""
+    for side, other in (("_left", "_right"), ("_right", "_left")):
+        if name.endswith(side):
+            return name.removesuffix(side) + other
+    return name
 
 
 def _bodies(template: Template, names: Sequence[str]) -> list[Floats]:

@@ -167,7 +167,7 @@ def _json(text: str, file: Path) -> _Raw:
     raw = _Raw([], [])
     whole = json.loads(text)
     if not isinstance(whole, dict):
-        raise ValueError("it is no object of names")
+        raise ValueError("it holds no 'markups', as 3D Slicer's do, and no names")
     if "markups" not in whole:
         return _plain_json(whole)
     for markup in whole["markups"]:
@@ -199,7 +199,8 @@ def _plain_json(whole: dict[str, Any]) -> _Raw:
         metres(unit)
     for name, numbers in whole.items():
         if not isinstance(numbers, list) or len(numbers) != 3:
-            raise ValueError(f"{name!r} must be a list of three numbers, or the file 3D Slicer's")
+            raise ValueError("it holds no 'markups', as 3D Slicer's do, and "
+                             f"{name!r} is no list of three numbers")  # fmt: skip
     return _Raw(list(whole), [[float(v) for v in one] for one in whole.values()], unit, frame)
 
 

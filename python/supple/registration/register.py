@@ -76,7 +76,8 @@ def register(
     except ConvergenceError as error:
         reason = too_little(scan, template, start is not None)
         raise ConvergenceError(reason, cause=str(error)) from None
-    return advised(found, landmarks, keep.landmark_sd)
+    return advised(found, landmarks, keep.landmark_sd,
+                   lambda: _stages(scan, template, None, keep, None, None))  # fmt: skip
 
 
 def _stages(

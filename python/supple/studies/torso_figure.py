@@ -33,8 +33,9 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> Path:
         for axes, (error, _) in zip(panels[:, column], _ERRORS, strict=True):
             _panel(axes, own, error)
         panels[-1, column].set_xlabel(_AXES.get(sweep, f"factor of {_SYMBOLS.get(sweep, sweep)}"))
-    for axes, (_, label) in zip(panels[:, 0], _ERRORS, strict=True):
+    for axes, (error, label) in zip(panels[:, 0], _ERRORS, strict=True):
         axes.set_ylabel(label)
+        axes.set_ylim(0, 1.05 * max(row[error] for row in rows))  # of the whole line of panels
     bodies = len({row.get("shape") for row in rows})
     figure.suptitle(f"Template registered to scans with a known answer, bodies a pose: {bodies}",
                     fontsize=10)  # fmt: skip
@@ -63,5 +64,4 @@ def _panel(axes: Any, rows: Sequence[dict[str, Any]], error: str) -> None:
                   mew=1.5, label="failed: surface > 5 mm or a landmark > 20 mm")  # fmt: skip
     if rows and rows[0]["sweep"] not in _AXES:
         axes.set_xscale("log")
-    axes.set_ylim(bottom=0)
     axes.grid(True, alpha=0.25)
