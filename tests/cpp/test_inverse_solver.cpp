@@ -81,18 +81,14 @@ TEST(relabelling_of_a_homogeneous_map_is_its_inverse_gradient) {
   CHECK_BELOW((left - right).norm(), 1e-12 * left.norm());
 }
 
-/// Without stress A is symmetric: its own factor leaves GMRES one iteration for the digits that a
-/// float has, and two for those of a double.
-TEST(unstressed_tangent_takes_one_iteration_for_each_float) {
+/// Without stress A is symmetric: its own factor leaves GMRES one iteration.
+TEST(unstressed_tangent_takes_one_iteration) {
   const Problem problem;
   const Vector values = problem.tangent(0.0, 1);
-  for (const bool twice : {false, true}) {
-    InverseSolver solver(problem.pattern, problem.reduction, problem.points);
-    CHECK(solver.prepare(values, problem.u()).ok());
-    problem.check(solver, values, twice ? 1e-10 : 1e-4);
-    CHECK(solver.work.iterations == (twice ? 2 : 1));
-    CHECK(solver.work.symmetric == 1 && solver.work.lu == 0);
-  }
+  InverseSolver solver(problem.pattern, problem.reduction, problem.points);
+  CHECK(solver.prepare(values, problem.u()).ok());
+  problem.check(solver, values, 1e-10);
+  CHECK(solver.work.iterations == 1 && solver.work.symmetric == 1 && solver.work.lu == 0);
 }
 
 /// L Lᵀ is handed out where it is what serves, and LDLᵀ, of an indefinite matrix, never.
