@@ -16,6 +16,10 @@ constexpr double kLightRate = 0.03;  // the same in single precision
 constexpr int kLeastSaved = 10, kMostSaved = 40; // small ones cost calls, large ones run faster
 constexpr int kFewest = 30;                      // iterations that are always granted
 
+/// Unknowns from which a factor in single precision is worth its noise: that takes the residual of
+/// a uniform state out of the few directions that GMRES would have to look at.
+constexpr Index kWorthSingle = 5'000;
+
 Mask free_of(const BlockPattern& pattern, const Reduction& reduction) {
   Mask free = Mask::Constant(pattern.dofs(), false);
   for (const Index dof : reduction.dof)
@@ -29,7 +33,10 @@ InverseSolver::InverseSolver(const BlockPattern& pattern, const Reduction& reduc
                              const Vector& points)
     : pattern_(pattern), reduction_(reduction), free_(free_of(pattern, reduction)),
       relabelling_(std::make_unique<Relabelling>(pattern, free_, points)),
-      mirror_(mirror(pattern, reduction)), light_serves_(pattern.scalars() == 0) {}
+      mirror_(mirror(pattern, reduction)),
+      light_(std::make_shared<Factor>(
+          Kind::Cholesky, reduction.free() < kWorthSingle ? Precision::Double : Precision::Single)),
+      light_serves_(pattern.scalars() == 0) {}
 
 InverseSolver::~InverseSolver() = default;
 
@@ -48,8 +55,8 @@ FactorStatus InverseSolver::prepare(const Vector& tangent, const ConstVector& u)
   return status.ok() || !finite ? status : factorise_lu();
 }
 
-/// Of the symmetric part: Cholesky in single precision, which takes half the time, unless it is not
-/// positive definite or that did not serve; LDLᵀ else.
+/// Of the symmetric part: Cholesky, of large ones in single precision, unless it is not positive
+/// definite or that did not serve; LDLᵀ else.
 FactorStatus InverseSolver::factorise() {
   const Stopwatch watch(work.factor);
   relabelling_->scale_columns(*tangent_, scaled_);

@@ -76,12 +76,12 @@ inline void KernelTerm::fill_constants(const supple_kernel& kernel, Buffers& b) 
 }
 
 template <int L>
-void KernelTerm::call(const supple_kernel& kernel, Index first, const double* u, Buffers& b) const {
+void KernelTerm::add(const supple_kernel& kernel, Index first, const double* u, Buffers& b,
+                     double* A) const {
   const supple_library& table = library_->table();
   const auto left = static_cast<Index>(cells_.rows() - first);
   const LaneCells cells{cells_.data() + first * cells_.cols(), std::min(left, Index{L}), nodes_,
                         scalars_};
-  clear<L>(kernel, b.A.get());
   double* w = b.w.get();
   for (int f = 0; f < kernel.field_count; ++f) {
     const Field& field = fields_[static_cast<std::size_t>(kernel.fields[f])];
@@ -99,7 +99,7 @@ void KernelTerm::call(const supple_kernel& kernel, Index first, const double* u,
     w += size * L;
   }
   gather_nodes<L>(cells, points_->data(), b.x.get());
-  kernel.call(b.A.get(), b.w.get(), b.x.get());
+  kernel.call(A, b.w.get(), b.x.get());
 }
 
 template <int L, class Consume>
@@ -117,7 +117,8 @@ void KernelTerm::each_of(const supple_kernel& kernel, const double* u, Consume c
         const Index group = colouring_.order[static_cast<std::size_t>(k)];
         const Index last = std::min(cells, (group + 1) * group_);
         for (Index first = group * group_; first < last; first += L) {
-          call<L>(kernel, first, u, b);
+          clear<L>(kernel, b.A.get());
+          add<L>(kernel, first, u, b, b.A.get());
           consume(std::integral_constant<int, L>(), first, std::min(Index{L}, last - first),
                   b.A.get(), group);
         }

@@ -166,6 +166,31 @@ void KernelTerm::tangent(const ConstVector& u, double scale, const Scatter& map,
   });
 }
 
+bool KernelTerm::matches(const KernelTerm& other) const {
+  const supple_library &table = library_->table(), &others = other.library_->table();
+  return tangent_ != nullptr && other.tangent_ != nullptr && !lower_only(*tangent_) &&
+         !lower_only(*other.tangent_) && tangent_->rows == other.tangent_->rows && scalars_ == 0 &&
+         other.scalars_ == 0 && table.lanes == others.lanes && points_ == other.points_ &&
+         same_cells(cells_, other.cells_);
+}
+
+bool KernelTerm::tangent_with(const Term& term, const ConstVector& u, const Scatter& map,
+                              MutableVector values) const {
+  const auto* const other = dynamic_cast<const KernelTerm*>(&term);
+  if (other == nullptr || !matches(*other)) return false;
+  other->require_fields();
+  other->work_->prepare(*other->tangent_, other->library_->table());
+  each(*tangent_, u, [&](auto lanes, Index first, Index count, double* A, Index) {
+    constexpr int L = decltype(lanes)::value;
+    Buffers& b = other->work_->thread[static_cast<std::size_t>(omp_get_thread_num())];
+    other->fill_constants(*other->tangent_, b);
+    other->template add<L>(*other->tangent_, first, u.data(), b, A);
+    const LaneCells cells{cells_.data() + first * cells_.cols(), count, nodes_, scalars_};
+    add_full<L>(cells, map, first, A, values.data());
+  });
+  return true;
+}
+
 void KernelTerm::tangent(const ConstVector& u, double scale, const LowerScatter& map,
                          MutableVector values) const {
   if (tangent_ == nullptr) return;

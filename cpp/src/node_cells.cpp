@@ -36,6 +36,10 @@ NodeCells node_cells(Index nodes, const std::vector<Connectivity>& connectivitie
   return map;
 }
 
+bool same_cells(const Connectivity& a, const Connectivity& b) {
+  return a.rows() == b.rows() && a.cols() == b.cols() && a == b;
+}
+
 Index scalars_of(const Connectivity& cells, Index nodes) {
   if (cells.rows() == 0) return 0;
   const auto count = static_cast<Index>((cells.row(0).array() >= nodes).count());

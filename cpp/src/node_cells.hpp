@@ -19,6 +19,8 @@ void check_nodes(const Connectivity& cells, Index nodes);
 /// @throws ShapeError if a cell names a node outside [0, nodes).
 NodeCells node_cells(Index nodes, const std::vector<Connectivity>& connectivities);
 
+bool same_cells(const Connectivity& a, const Connectivity& b);
+
 /// How many columns at the end are scalars, numbered from `nodes` on, in every row alike.
 /// @throws ShapeError if a row mixes them.
 Index scalars_of(const Connectivity& cells, Index nodes);

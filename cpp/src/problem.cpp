@@ -24,7 +24,8 @@ Problem::Problem(System& system_, const Vector& start, const Vector& prescribed,
 }
 
 Vector Problem::residual(const Vector& u, double s) const {
-  Vector r = system.residual(u, loads(s));
+  at_ = u;
+  Vector r = system.residual_beside(u, loads(s), external_);
   if (settings.warm) r -= held_back(s) * offset_;
   return r;
 }
@@ -49,7 +50,9 @@ double Problem::free_norm(const Vector& r) const {
 
 double Problem::scale(const Vector& u, const Vector& r, double s) const {
   const double fixed = std::sqrt(is_free_.select(0.0, r.array().square()).sum());
-  return std::max(std::abs(loads(s)) * system.external(u).norm(), fixed);
+  const double force =
+      at_.size() == u.size() && at_ == u ? external_.norm() : system.external(u).norm();
+  return std::max(std::abs(loads(s)) * force, fixed);
 }
 
 double Problem::tolerance(const Vector& u, const Vector& r, double s) const {

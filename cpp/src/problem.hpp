@@ -50,6 +50,7 @@ class Problem {
   const Progress& progress_;
   Mask is_free_;
   Vector start_, travel_, offset_;
+  mutable Vector at_, external_; // force at the u whose residual was asked for last
 };
 
 } // namespace supple

@@ -69,8 +69,14 @@ BlockPattern block_pattern(NodeGraph graph, const std::vector<Connectivity>& con
   BlockPattern pattern;
   static_cast<NodeGraph&>(pattern) = std::move(graph);
   expand_to_dofs(pattern);
-  for (const Connectivity& cells : connectivities)
-    pattern.scatter.push_back(scatter_map(pattern, cells));
+  for (auto cells = connectivities.begin(); cells != connectivities.end(); ++cells) {
+    const auto same = std::find_if(connectivities.begin(), cells, [&](const Connectivity& other) {
+      return same_cells(other, *cells); // a load's and the body's own
+    });
+    const auto known = static_cast<std::size_t>(same - connectivities.begin());
+    pattern.scatter.push_back(same == cells ? scatter_map(pattern, *cells)
+                                            : pattern.scatter[known]);
+  }
   return pattern;
 }
 

@@ -76,6 +76,15 @@ void System::residual(const ConstVector& u, double load_factor, MutableVector r)
     if (!term->is_silent) term->residual(u, factor_of(*term, load_factor), r);
 }
 
+Vector System::residual_beside(const ConstVector& u, double load_factor, Vector& external) const {
+  external = this->external(u);
+  const Stopwatch watch(timings.residual);
+  Vector r = -load_factor * external;
+  for (const auto& term : terms_)
+    if (!term->is_load && !term->is_silent) term->residual(u, 1.0, r);
+  return r;
+}
+
 Vector System::external(const ConstVector& u) const {
   const Stopwatch watch(timings.residual);
   Vector r = Vector::Zero(dofs());
@@ -157,12 +166,24 @@ void System::assemble_full() {
   const BlockPattern& p = pattern();
   const Stopwatch watch(timings.assembly);
   values_.setZero(p.nonzeros());
+  std::vector<bool> done(terms_.size(), false);
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const double scale = factor_of(*terms_[t], load_factor_);
-    if (scale != 0.0 && !terms_[t]->is_silent)
-      terms_[t]->tangent(at_, scale, p.scatter[t], values_);
+    if (done[t] || scale == 0.0 || terms_[t]->is_silent) continue;
+    const std::size_t other = scale == 1.0 ? add_with_another(t, done) : t;
+    done[other] = true;
+    if (other == t) terms_[t]->tangent(at_, scale, p.scatter[t], values_);
   }
   full_is_made_ = true;
+}
+
+/// The term behind `t` whose tangent was added together with its own, or `t` if there is none such.
+std::size_t System::add_with_another(std::size_t t, const std::vector<bool>& done) {
+  for (std::size_t k = t + 1; k < terms_.size(); ++k) {
+    if (done[k] || factor_of(*terms_[k], load_factor_) != 1.0 || terms_[k]->is_silent) continue;
+    if (terms_[t]->tangent_with(*terms_[k], at_, pattern_->scatter[t], values_)) return k;
+  }
+  return t;
 }
 
 const Vector& System::full_tangent() {

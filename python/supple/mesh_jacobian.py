@@ -13,8 +13,9 @@ from supple.kernels.cells import Element
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-#: Cells that are looked at together, so that what is computed of them stays in the cache.
-_AT_ONCE = 1024
+#: Cells that are looked at together, at most, and multiplications of one product over them: what is
+#: computed stays in the cache, and BLAS wakes no threads for it.
+_AT_ONCE, _PRODUCT = 2048, 250_000
 
 #: Inverse of the edges of the ideal cell, as columns: regular tetrahedron, cube, regular prism.
 _IDEAL = {
@@ -100,14 +101,15 @@ def smallest_jacobian(points: Floats, cells: Ints, element: Element) -> Floats:
         at = at[:1]
     slopes = np.ascontiguousarray(element.gradients(at).transpose(2, 0, 1))
     result = np.empty(len(cells))
-    for first in range(0, len(cells), _AT_ONCE):
-        some = cells[first : first + _AT_ONCE].T
+    step = min(_AT_ONCE, _PRODUCT // slopes[0].size)
+    for first in range(0, len(cells), step):
+        some = cells[first : first + step].T
         x = [np.ascontiguousarray(points[:, i])[some] for i in range(3)]
         columns = [[slopes[j] @ x[i] for j in range(3)] for i in range(3)]
         arms = [component[1 : element.corners] - component[0] for component in x]
         length = np.sqrt(sum(arm**2 for arm in arms).max(axis=0))
         size = np.maximum(length, np.finfo(float).tiny ** 0.25) ** 3
-        result[first : first + _AT_ONCE] = _determinant(columns).min(axis=0) / size
+        result[first : first + step] = _determinant(columns).min(axis=0) / size
     return result
 
 

@@ -91,6 +91,22 @@ TEST(unstressed_tangent_takes_one_iteration) {
   CHECK(solver.work.iterations == 1 && solver.work.symmetric == 1 && solver.work.lu == 0);
 }
 
+/// L Lᵀ is handed out where it is what serves, and LDLᵀ, of an indefinite matrix, never.
+TEST(only_a_definite_factor_is_handed_out) {
+  const Problem problem;
+  const Vector definite = problem.tangent(0.0, 1), indefinite = problem.tangent(0.0, 1, 30.0);
+  InverseSolver solver(problem.pattern, problem.reduction, problem.points);
+  CHECK(!solver.definite_factor());
+  CHECK(solver.prepare(definite, problem.u()).ok());
+  CHECK(solver.definite_factor()->kind() == Kind::Cholesky);
+  solver.forget();
+  CHECK(!solver.definite_factor());
+  CHECK(solver.prepare(indefinite, problem.u()).ok());
+  CHECK(!solver.definite_factor());
+  problem.check(solver, indefinite);
+  CHECK(solver.work.symmetric == 3 && solver.work.lu == 0);
+}
+
 /// One factorisation serves the tangents that follow, each solved as a dense LU solves it.
 TEST(near_tangents_share_a_factor) {
   const Problem problem;
@@ -114,7 +130,7 @@ TEST(stagnation_falls_back_to_a_new_factor_and_then_to_lu) {
   CHECK(solver.prepare(other, problem.u()).ok());
   CHECK(solver.work.symmetric == 1); // the old one is tried first
   problem.check(solver, other, 1e-9);
-  CHECK(solver.work.symmetric == 2 && solver.work.lu == 0);
+  CHECK(solver.work.symmetric == 3 && solver.work.lu == 0); // L Lᵀ finds it indefinite
   const Vector unsymmetric = problem.tangent(300.0, 6);
   CHECK(solver.prepare(unsymmetric, problem.u()).ok());
   problem.check(solver, unsymmetric, 1e-9);

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import supple
+from supple import assembly, newton
 
 EDGE = 0.1
 
@@ -90,6 +91,30 @@ def test_rotations_of_a_bent_beam_cost_no_second_factor():
     assert angle > 40
     assert rest.timings["factorisations"] == 1
     assert rest.timings["krylov_iterations"] < 12 * rest.iterations
+
+
+@pytest.mark.parametrize("strain", [-0.004, -0.02, -0.1, 0.1])
+def test_stability_is_that_of_a_factorisation(strain):
+    """A clamped column pressed to half of Euler's strain, to more than twice that, far more, drawn.
+
+    Its slenderness is 5: π²/4 · (1/5)²/12 = 0.8 %. On the factor that an inverse solve has kept,
+    and by the signs of the pivots of LDLᵀ.
+    """
+    mesh = supple.Mesh.box((15, 3, 3), (5.0, 1.0, 1.0), "P1")
+    body = supple.Body(mesh, "neo_hookean", young=1e4, poisson=0.3, density=1.0)
+    body.fix(lambda p: p[:, 0] < 1e-9).gravity((0.0, 0.0, -0.1))
+    body.rest_shape(solver="gmres")
+    inverse = assembly.system(body, inverse=True).system
+    u = np.zeros_like(mesh.points)
+    u[:, 0] = strain * mesh.points[:, 0]
+    counted = newton.unstable_directions(body, u.ravel())
+    assert (counted > 0) == (strain < -0.01)
+    assert newton.unstable_directions(body, u.ravel(), inverse) == counted
+    built = assembly.system(body).system
+    built.reset_timings()
+    newton.unstable_directions(body, u.ravel(), inverse)
+    assert built.timings.krylov_iterations > 0
+    assert (built.timings.factorisations > 0) == (counted > 0)
 
 
 def test_a_factor_that_no_longer_serves_is_replaced():

@@ -61,7 +61,7 @@ class InverseSolver {
   std::unique_ptr<Relabelling> relabelling_;
   std::vector<Index> mirror_;
   std::unique_ptr<Reduction> full_; // for LU, made when it is first needed
-  std::shared_ptr<Factor> light_ = std::make_shared<Factor>(Kind::Cholesky, Precision::Single);
+  std::shared_ptr<Factor> light_;   // L Lᵀ
   bool light_serves_;
   Factor exact_{Kind::QuasiDefinite}, lu_{Kind::Unsymmetric};
   Factor* kept_ = nullptr; // that preconditions

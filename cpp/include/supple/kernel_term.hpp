@@ -43,6 +43,9 @@ class KernelTerm final : public Term {
                MutableVector values) const override;
   void tangent(const ConstVector& u, double scale, const LowerScatter& map,
                MutableVector values) const override;
+  /// Of terms on the same cells, without scalars, whose kernels give whole matrices.
+  bool tangent_with(const Term& other, const ConstVector& u, const Scatter& map,
+                    MutableVector values) const override;
   /// The cell's number is that of the cells as they were given.
   VolumeRatio volume_ratio(const ConstVector& u) const override;
 
@@ -65,11 +68,12 @@ class KernelTerm final : public Term {
   void add_residual(const ConstVector& u, double scale, MutableVector r) const;
   /// The residual of a load that does not depend on u (3n); computed once for the fields' values.
   const Vector& constant() const;
+  bool matches(const KernelTerm& other) const;
   /// The entries of w that are alike in all batches.
   void fill_constants(const supple_kernel& kernel, Buffers& b) const;
-  /// Gather w and x of the batch of cells [first, first + lanes), zero A and call the kernel.
+  /// Gather w and x of the batch of cells [first, first + lanes) and let the kernel add to A.
   template <int L>
-  void call(const supple_kernel& kernel, Index first, const double* u, Buffers& b) const;
+  void add(const supple_kernel& kernel, Index first, const double* u, Buffers& b, double* A) const;
   /// For each batch: call the kernel, then consume(lanes, first cell, cells in the batch, A, group
   /// number); lanes is an integral constant.
   template <class Consume>

@@ -75,6 +75,8 @@ class System {
   Vector residual(const ConstVector& u, double load_factor) const;
   /// The same into `r` (dofs), which takes no memory.
   void residual(const ConstVector& u, double load_factor, MutableVector r) const;
+  /// R, and `external` = external(u) beside it, each load evaluated once.
+  Vector residual_beside(const ConstVector& u, double load_factor, Vector& external) const;
   /// External force alone, −R of the loads at factor 1 (dofs), N.
   Vector external(const ConstVector& u) const;
   VolumeRatio volume_ratio(const ConstVector& u) const;
@@ -142,6 +144,7 @@ class System {
   void forget_factors();
   std::vector<Connectivity> connectivities() const;
   void assemble_full();
+  std::size_t add_with_another(std::size_t t, const std::vector<bool>& done);
 
   std::shared_ptr<Vector> points_;
   std::vector<Index> home_;

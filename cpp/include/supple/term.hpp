@@ -39,6 +39,11 @@ class Term {
   /// The same of a symmetric tangent on the lower triangle of the free dofs.
   virtual void tangent(const ConstVector& u, double scale, const LowerScatter& map,
                        MutableVector values) const = 0;
+  /// values += the tangents of this term and of another, where the two can be added up cell by
+  /// cell; else false, and nothing is done.
+  virtual bool tangent_with(const Term&, const ConstVector&, const Scatter&, MutableVector) const {
+    return false;
+  }
   /// Smallest J over the points of the cells; infinity for a term without volume.
   virtual VolumeRatio volume_ratio(const ConstVector& u) const = 0;
 
