@@ -52,12 +52,12 @@ Mat3 inverse_left(const Vec3& phi) {
   return Mat3::Identity() - 0.5 * cross + c * cross * cross;
 }
 
-/// Its derivative: exp(ω_k) R_k and exp(ω_p) R_p turn log(R_k R_pᵀ), seen from the parent, to
-/// log(exp(ω_k − ω_p) R_k R_pᵀ).
+/// Its derivative, seen from axes that do not turn with the parent.
 JointRows turn_rows(const Mat3& parent, const Vec3& turn) {
   JointRows rows = JointRows::Zero();
-  rows.block<3, 3>(0, 0) = parent.transpose() * inverse_left(parent * turn);
-  rows.block<3, 3>(0, 9) = -rows.block<3, 3>(0, 0);
+  const Mat3 inverse = inverse_left(parent * turn);
+  rows.block<3, 3>(0, 0) = parent.transpose() * inverse;
+  rows.block<3, 3>(0, 9) = -(inverse * parent).transpose();
   return rows;
 }
 
@@ -179,9 +179,12 @@ void add_priors(const Rig& rig, const RigPosture& posture, const RigWeights& wei
     }
     add_pair(rig, k, rows, gap, scale, normal);
     const Vec3 turn = turn_gap(rig, posture, k);
-    add_pair(rig, k, turn_rows(posture.rotations[at(p)], turn),
-             turn - priors.rotation_mean.segment<3>(3 * k),
-             weights.joint * precision(priors.rotation, k), normal);
+    const Mat3& R = posture.rotations[at(p)];
+    const Vec3 rare = turn - priors.rotation_mean.segment<3>(3 * k);
+    const Vec3 stiff = weights.joint * precision(priors.rotation, k);
+    add_pair(rig, k, turn_rows(R, turn), rare, stiff, normal);
+    // The axes do turn with it: nothing where they are alike, and in the gradient alone.
+    normal.gradient.segment<3>(9 * p) += R * stiff.cwiseProduct(rare).cross(turn);
     if (!priors.stiff_joints)
       add_pair(rig, k, joint_rows(rig, posture, k), joint_gap(rig, posture, k),
                Vec3::Constant(weights.joint * inverse_square(priors.joint[k])), normal);
