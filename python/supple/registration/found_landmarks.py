@@ -61,9 +61,10 @@ def told_landmarks(
     sds = dict(zip(found.names, found.sds, strict=True))
     at = template.landmark_points(points)
     near = {name: marks.get(name, place) for name, place in at.items() if "nipple" in name}
-    for name, one in refine(scan, near).items():
-        if one.confidence > ON_SKIN:
-            marks[name], sds[name] = one.point, TIP
+    tips = {k: one for k, one in refine(scan, near).items() if one.confidence > ON_SKIN}
+    if len(tips) == len(near):  # one alone may be a ridge of something else
+        marks |= {name: one.point for name, one in tips.items()}
+        sds |= dict.fromkeys(tips, TIP)
     apart = [float(np.linalg.norm(place - at[name])) for name, place in marks.items()]
     return marks, sds, max(apart, default=0.0)
 
