@@ -157,15 +157,14 @@ void SkinTree::refit(const Points& points) {
     fill(wide);
 }
 
-SkinTree::Lanes SkinTree::Wide::squared_distance(const Vec3& q) const {
-  Lanes sum{};
+void SkinTree::Wide::measure(const Vec3& q, Lanes& squared) const {
+  squared = Lanes{};
   for (int d = 0; d < 3; ++d) {
     const Lanes below = low[d] - q[d], above = q[d] - high[d];
     Lanes outside = below > above ? below : above;
     outside = outside > 0.0 ? outside : Lanes{};
-    sum += outside * outside;
+    squared += outside * outside;
   }
-  return sum;
 }
 
 Landing SkinTree::closest(const Vec3& q, double reach, int hint) const {
@@ -187,7 +186,8 @@ Landing SkinTree::closest(const Vec3& q, double reach, int hint) const {
       continue;
     }
     const Wide& wide = wide_[static_cast<std::size_t>(entry.child)];
-    const Lanes squared = wide.squared_distance(q);
+    Lanes squared;
+    wide.measure(q, squared);
     const std::size_t from = top;
     for (int k = 0; k < kLanes; ++k) {
       if (!(squared[k] < best.squared)) continue;

@@ -52,7 +52,7 @@ class SkinTree {
     Lanes low[3], high[3];
     int node[kLanes];  ///< whose box a lane has, −1
     int child[kLanes]; ///< a wide node, or ~leaf
-    Lanes squared_distance(const Eigen::Vector3d& q) const;
+    void measure(const Eigen::Vector3d& q, Lanes& squared) const;
   };
 
   void build(const Points& points, int begin, int end);
