@@ -29,6 +29,7 @@ _TIGHTER = {
     "breast_lower_pole": (-3.0, 4.0),
     "breast_fold": (-2.5, 4.0),
     "ribs_110": (-4.0, 3.0),
+    "breast_up": (-3.5, 4.0),
 }
 
 
