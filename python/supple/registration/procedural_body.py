@@ -1,8 +1,10 @@
 """The procedural torso as a closed form: a level set that is negative inside; its normals.
 
-Sizes are those of an average adult woman: heights, breadths and girths of the 2012 survey of
-Gordon et al. (ANSUR II, Natick/TR-15/007), nipple and notch distances of Westreich (1997),
-Plast. Reconstr. Surg. 100, 468–479. The height z = 0 is that of the nipples.
+Proportions lie amid those of MakeHuman's average young woman (CC0), the Visible Human female and
+the mean of the 110 torsos of iRBSM, each brought to one size and pose by a registration; sizes are
+near the 2012 survey of Gordon et al. (ANSUR II, Natick/TR-15/007) and Al-Qattan et al. (2019),
+Plast. Reconstr. Surg. Glob. Open 7, e2326 (nipples 20 cm apart, folds 8 cm below them). The height
+z = 0 is 2 cm above the nipples.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ _TRUNK = np.array([
     (-0.31, 0.176, -0.108, 0.118, 2.3),
     (-0.23, 0.149, -0.112, 0.090, 2.3),
     (-0.15, 0.132, -0.116, 0.077, 2.4),
-    (-0.08, 0.135, -0.115, 0.088, 2.45),
+    (-0.08, 0.135, -0.112, 0.088, 2.45),
     (0.00, 0.141, -0.103, 0.101, 2.5),
     (0.07, 0.136, -0.075, 0.103, 2.5),
     (0.12, 0.122, -0.044, 0.096, 2.45),

@@ -21,14 +21,15 @@ _TIGHTER = {
     "breast_projection": (-2.0, 5.0),
     "breast_heavy": (-2.5, 5.0),
     "axilla_front": (-4.0, 2.5),
-    "axilla_side": (-4.0, 1.5),
-    "dorsi": (-4.0, 2.5),
+    "axilla_side": (-4.0, 1.25),
+    "dorsi": (-4.0, 2.25),
     "chest_75": (-4.0, 2.0),
     "arm_length": (-2.5, 4.0),
     "chest_0": (-4.0, 2.5),
     "breast_lower_pole": (-3.0, 4.0),
     "breast_fold": (-2.5, 4.0),
     "ribs_110": (-4.0, 3.0),
+    "breast_up": (-3.5, 4.0),
 }
 
 

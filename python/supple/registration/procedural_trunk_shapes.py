@@ -67,7 +67,7 @@ TRUNK_SHAPES: dict[str, Field] = {
     "spine_furrow": trunk_bump((0.0, 0.09, -0.06), (0.035, 0.08, 0.20), -0.005),
     "kyphosis": _kyphosis(0.12, 0.14, 0.014),
     "lordosis": _kyphosis(-0.16, 0.13, -0.012),
-    "dorsi_left": trunk_bump((0.12, 0.07, 0.04), (0.07, 0.09, 0.09), 0.008),
+    "dorsi_left": trunk_bump((0.12, 0.07, 0.04), (0.07, 0.09, 0.09), 0.0058),
     "scapula_left": trunk_bump((0.085, 0.115, 0.075), (0.06, 0.08, 0.08), 0.008),
     "shoulder_up_left": shift((0.17, 0.02, 0.14), (0.13, 0.16, 0.12), (0.0, 0.0, 0.014)),
     "shoulder_out_left": shift((0.17, 0.02, 0.13), (0.13, 0.16, 0.14), (0.012, 0.0, 0.0)),
