@@ -12,7 +12,6 @@ from supple.registration.landmark_rules import (
     breast_edges,
     drawn_through,
     fold_below,
-    level_with,
     notch_height,
     turning,
 )
@@ -59,15 +58,6 @@ def edge_at(template, place):
     nearest = np.linalg.norm(template.points - place, axis=1).argmin()
     corners = template.points[template.triangles[(template.triangles == nearest).any(axis=1)]]
     return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
-
-
-def test_level_points_of_a_circle_are_its_chord():
-    """x² + z² = 1 at z = 0.6: x = ±0.8; of 400 chords, within their sagitta 4e-5."""
-    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
-    circle = np.column_stack([2 + np.cos(angle), 0 * angle, np.sin(angle)])
-    inner, outer = level_with(circle, np.array([2.0, 0.0, 0.6]))
-    assert np.allclose(inner, (1.2, 0, 0.6), atol=1e-4)
-    assert np.allclose(outer, (2.8, 0, 0.6), atol=1e-4)
 
 
 def test_the_notch_is_the_corner_of_two_slopes():

@@ -30,16 +30,16 @@ def advised(
 
     Args:
         landmarks: name → (3,) m that were given; they pulled with ``sd`` m.
-        alone: registers the scan without landmarks; called where one is doubted.
+        alone: registers the scan without landmarks; called where one, or the size, is doubted.
     """
     given = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
     more = misplaced(found, given, sd)
-    if more:
-        more = mistaken(alone().landmarks, given) or more
-    elif body_size(found).doubt:
+    if not more and body_size(found).doubt:
         more = [body_size(found).doubt]
     if not more:
         return found
+    if given:
+        more = mistaken(alone().landmarks, given) or more
     return replace(found, warnings=[*more, *found.warnings], trustworthy=False)
 
 

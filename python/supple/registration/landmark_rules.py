@@ -145,17 +145,6 @@ def fold_of(line: Floats, nipple: Floats) -> Floats:
     return np.asarray(line[np.argmax(off[:, 1] * along[0] - off[:, 0] * along[1])])
 
 
-def level_with(outline: Floats, nipple: Floats) -> tuple[Floats, Floats]:
-    """Innermost and outermost point (3,) m of a breast's outline (k, 3) at its nipple's height."""
-    after = np.roll(outline, -1, axis=0)
-    above, next_above = outline[:, 2] - nipple[2], after[:, 2] - nipple[2]
-    cut = np.flatnonzero((above > 0) != (next_above > 0))
-    share = (above[cut] / (above[cut] - next_above[cut]))[:, None]
-    points = (1 - share) * outline[cut] + share * after[cut]
-    aside = np.abs(points[:, 0])
-    return points[aside.argmin()], points[aside.argmax()]
-
-
 def axilla(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
     """The edge (3,) m of the left anterior axillary fold, on an edge of the skin.
 

@@ -8,9 +8,10 @@ import numpy.typing as npt
 from supple.registration import procedural_body as body
 from supple.registration.landmark_rules import (
     armpit,
+    breast_edges,
+    drawn_through,
     fold_before,
     fold_of,
-    level_with,
     notch_height,
     xiphoid_height,
 )
@@ -34,7 +35,7 @@ def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
     apex = _saddle(armpit(skin.points, skin.triangles))
     front = fold_before(_section(apex, -0.01, 0.08), apex)
     by_shape = {"breast_inferior_left": fold[None], "axilla_left": front[None]}
-    for name, points in {**_left_places(fold), **by_shape}.items():
+    for name, points in {**_left_places(skin, fold), **by_shape}.items():
         found[name] = _nearest(skin, points, closed=name == "breast_left")
         found[name.removesuffix("left") + "right"] = mirrored(skin, found[name])
     return {name: found[name] for name in LANDMARKS}, {name: found[name] for name in CURVES}
@@ -110,10 +111,11 @@ def _nearest(skin: Skin, points: Floats, closed: bool = False) -> OnSurface:
     )
 
 
-def _left_places(fold: Floats) -> dict[str, Floats]:
+def _left_places(skin: Skin, fold: Floats) -> dict[str, Floats]:
     """Points (k, 3) m of the left: of each landmark and of the breast's outline.
 
-    Above, the outline is the base's; below, the half ellipse through the ``fold`` (3,) m.
+    Above, the outline is the base's; below, the half ellipse through the ``fold`` (3,) m; both
+    are drawn through the edges of the breast.
     """
     outline = np.pi + np.linspace(0, 2 * np.pi, 48, endpoint=False)
     aside, under = (fold - body.BREAST) @ body.BREAST_AXES[:2].T - BASE
@@ -123,12 +125,12 @@ def _left_places(fold: Floats) -> dict[str, Floats]:
     start = body.BREAST + on_base @ body.BREAST_AXES[:2] + 0.10 * body.BREAST_AXES[2]
     line = body.met(start, -body.BREAST_AXES[2])
     nipple = body.nipple()
-    medial, lateral = level_with(line, nipple)
+    medial, lateral = breast_edges(skin.points, skin.triangles, nipple, fold)
     return {
         "nipple_left": nipple[None],
         "breast_medial_left": medial[None],
         "breast_lateral_left": lateral[None],
-        "breast_left": line,
+        "breast_left": drawn_through(line, np.stack([medial, fold, lateral])),
     }
 
 
