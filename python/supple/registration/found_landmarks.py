@@ -11,7 +11,7 @@ import numpy.typing as npt
 from supple.registration.posture import Posture
 from supple.registration.refine_landmarks import ON_SKIN, refine
 from supple.registration.register_settings import RegisterSettings
-from supple.registration.rest_landmarks import at_rest, evidence
+from supple.registration.rest_landmarks import alike, at_rest, evidence
 from supple.registration.rig import Rig
 from supple.registration.template import Floats, Template
 from supple.surface import Surface
@@ -62,11 +62,25 @@ def told_landmarks(
     at = template.landmark_points(points)
     near = {name: marks.get(name, place) for name, place in at.items() if "nipple" in name}
     tips = {k: one for k, one in refine(scan, near).items() if one.confidence > ON_SKIN}
-    if len(tips) == len(near):  # one alone may be a ridge of something else
+    if _paired(template, posture, {name: one.point - at[name] for name, one in tips.items()}):
         marks |= {name: one.point for name, one in tips.items()}
         sds |= dict.fromkeys(tips, TIP)
     apart = [float(np.linalg.norm(place - at[name])) for name, place in marks.items()]
     return marks, sds, max(apart, default=0.0)
+
+
+def _paired(template: Template, posture: Posture, steps: Mapping[str, Floats]) -> bool:
+    """Whether both sides show a tip, in places alike: one alone may be a ridge of something else.
+
+    Args:
+        steps: (3,) m, from where the fit has each nipple.
+    """
+    names = [bone.name for bone in template.bones]
+    if len(steps) != 2 or "chest" not in names:
+        return False
+    R = posture.rotations[names.index("chest")]
+    one, other = (R.T @ step for step in steps.values())
+    return alike(one, other)
 
 
 def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, Proposal]:

@@ -108,7 +108,8 @@ def _stages(
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("judge")
-    return _result(rig, scan, fit, moved, rivals, keep, clock)
+    held = set(template.landmarks) <= set(named)
+    return _result(rig, scan, fit, moved, rivals, held, keep, clock)
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
@@ -253,13 +254,13 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
 
 
 def _result(
-    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, rivals: list[Rival],
+    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, rivals: list[Rival], held: bool,
     keep: RegisterSettings, clock: _Clock,
 ) -> Registration:  # fmt: skip
     covariance = uncertainty.of_fit(fit, rig.template)
     points = fit.points + moved.vectors
     off = astray(scan, rig.template, fit.posture, points, keep.doubts.sure) if rivals else 0.0
-    warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off)
+    warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off, held)
     history = [
         value for one in [*(rival.fit for rival in rivals[:1]), fit] for value in one.history
     ]

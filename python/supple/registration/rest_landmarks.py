@@ -33,8 +33,12 @@ _FAR = 0.07
 #: m, by which the mirror image of a nipple at rest differs from the other (5 mm on random bodies).
 _ALIKE, _IMAGE = 6e-3, np.array([-1.0, 1.0, 1.0])
 _NONE = np.zeros(3), 0.0
+#: m, by which steps of the two sides may differ and still tell of the same slide.
+_PAIRED = 12e-3
 #: m below the foremost skin, whose mean is the breast's tip.
 _TIP = 2e-3
+#: m (rms) over which a tip may spread: that of a flatter breast is anywhere, as noise has it.
+_FLAT = 11e-3
 
 
 @dataclass(frozen=True)
@@ -162,15 +166,25 @@ def _steps(
     """From where the fit has landmarks to where the rules have them, (3,) m, and its sd, m.
 
     What is within a rule's doubt says nothing: it would hold a landmark where the fit has it.
+    Nor do two sides that contradict each other: skin slides on both alike.
     """
     at, steps = template.landmark_points(skin), {}
-    for name, place in told(template, skin).items():
-        rule, step = TOLD[kind(name)], place - at[name]
+    apart = {name: place - at[name] for name, place in told(template, skin).items()}
+    for name, step in apart.items():
+        other = apart.get(_opposite(name))
+        if _opposite(name) != name and other is not None and not alike(step, other):
+            continue
+        rule = TOLD[kind(name)]
         size = max(float(np.linalg.norm(step)), 1e-9)
         sure = 1.0 if name in slid else 1 - (rule.doubt / size) ** 4
         if sure > 0 and size < _FAR:
             steps[name] = sure * step, rule.sd / sure
     return steps
+
+
+def alike(left: Floats, right: Floats) -> bool:
+    """Whether steps (3,) m of two sides, in the body's frame, are nearly each other's image."""
+    return float(np.linalg.norm(left - right * _IMAGE)) < _PAIRED
 
 
 def _shown(template: Template, name: str, seen: npt.NDArray[np.bool_]) -> bool:
@@ -237,7 +251,7 @@ def _xiphoid(template: Template, skin: Floats, at: Mapping[str, Floats]) -> Floa
 
 
 def _tip(template: Template, skin: Floats, side: str) -> Floats | None:
-    """What stands out most from the plane of the breast's outline."""
+    """What stands out most from the plane of the breast's outline, if that is one place."""
     outline = template.curves[f"breast_{side}"].at(skin, template.triangles)
     across = np.linalg.svd(outline - outline.mean(axis=0), full_matrices=False)[2][2]
     breast = skin[template.regions[f"breast_{side}"]]
@@ -246,7 +260,9 @@ def _tip(template: Template, skin: Floats, side: str) -> Floats | None:
     height = breast @ (across * -np.sign(across[1]))
     near = np.linalg.norm(breast - breast[height.argmax()], axis=1) < 0.03
     weight = np.exp((height[near] - height.max()) / _TIP)
-    return np.asarray(weight @ breast[near] / weight.sum())
+    top = weight @ breast[near] / weight.sum()
+    wide = np.sqrt(weight @ ((breast[near] - top) ** 2).sum(axis=1) / weight.sum())
+    return np.asarray(top) if wide < _FLAT else None
 
 
 def _fold(template: Template, skin: Floats, nipple: Floats, fit: Floats) -> Floats | None:

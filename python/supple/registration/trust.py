@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from supple.registration.rivals import Rival
 
 
+#: m, of a scan without noise: what smooth skin between patches leaves.
+_QUIET = 0.5e-3
+
+
 @dataclass(frozen=True)
 class Doubts:
     """Limits beyond which a fit is not trusted; lengths in m."""
@@ -25,6 +29,7 @@ class Doubts:
     sd: float = 10e-3  #: largest mean standard deviation of the breasts' vertices
     rival: float = 1.2  #: more must speak against the next facing than the best, by this factor
     offset: float = 1.5e-3  #: largest rms by which seen skin leaves what bones and shapes can do
+    unlike: float = 0.36  #: and the same in sds of the scan's noise: skin that left it also slid
     shape: float = 13.0  #: largest distance of all shapes together, in standard deviations
     sizes: float = 1.2  #: largest rms of the bones' scales, in standard deviations
     turns: float = 1.0  #: largest rms of the bones' turns against their parents, likewise
@@ -35,7 +40,7 @@ class Doubts:
 
 def doubts(
     rig: Rig, fit: RigFit, offset: Floats, rivals: Sequence[Rival], covariance: Floats,
-    limits: Doubts, astray: float = 0.0,
+    limits: Doubts, astray: float = 0.0, held: bool = False,
 ) -> list[str]:  # fmt: skip
     """One sentence a reason not to trust ``fit``.
 
@@ -43,6 +48,10 @@ def doubts(
         offset: (n, 3) m of the last stage.
         rivals: facings that were compared, the chosen one first; none where a start was given.
         astray: m from a nipple of the fit to where the scan shows one.
+        held: whether all landmarks were given, so that the skin could not slide.
+
+    ``limits.unlike`` parts fits of one template to bodies of another, most of which have a landmark
+    off by more than 20 mm, from those to its own: shapes 1000 to 1011 in 4 poses, 192 fits.
     """
     template = rig.template
     breasts = template.regions["breast_left"] | template.regions["breast_right"]
@@ -54,6 +63,7 @@ def doubts(
              for side in ("left", "right")}  # fmt: skip
     ratio = _rival(rivals)
     away = float(np.sqrt((offset[seen] ** 2).sum(axis=1).mean())) if seen.any() else 0.0
+    unlike = away / max(fit.residual_sd, _QUIET)
     shape = _deviations(fit.energy["blendshape"], 1)
     sizes = _deviations(fit.energy["scale"], 3 * len(template.bones))
     turns = _deviations(fit.energy["rotation"], 3 * len(template.bones))
@@ -74,6 +84,11 @@ def doubts(
         ),
         f"The skin had to leave what the template can become by {1e3 * away:.1f} mm (rms), more "
         f"than {1e3 * limits.offset:.1f} mm; check where the landmarks are.": away > limits.offset,
+        f"The skin had to leave what the template can become by {unlike:.2f} of the scan's noise, "
+        f"more than {limits.unlike:g}; the body is unlike the template's, so that landmarks may "
+        "have slid: give all of them.": unlike > limits.unlike
+        and away <= limits.offset
+        and not held,
         f"The scan shows a nipple {1e3 * astray:.0f} mm from where the fit has it, more than "
         f"{1e3 * limits.astray:.0f} mm; give landmarks.": astray > limits.astray,
         f"The bones' sizes are {sizes:.1f} standard deviations (rms) from a body's, more than "
