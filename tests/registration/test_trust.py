@@ -83,6 +83,14 @@ def test_an_implausible_body_is_said(term: str, word: str) -> None:
     assert any(word in text for text in _doubts(fit=unlike))
 
 
+def test_a_body_unlike_the_template_is_said_unless_all_landmarks_hold_it() -> None:
+    """Skin half the scan's noise away from what the template can become, in one direction."""
+    away = np.zeros_like(_found().offset)
+    away[:, 1] = 0.5 * max(_found().fit.residual_sd, 5e-4)
+    assert [text for text in _doubts(offset=away) if "0.50 of the scan's noise" in text]
+    assert _doubts(offset=away, held=True) == []
+
+
 def test_a_nipple_elsewhere_is_said() -> None:
     """Where the scan surely shows one 30 mm away."""
     assert any("nipple" in text for text in _doubts(astray=0.03))
