@@ -261,6 +261,10 @@ def test_a_spacing_that_makes_no_torso_is_refused(spacing: float) -> None:
 
 def test_ctrl_c_still_reaches_python() -> None:
     """Mmg's own handler would end the process."""
-    torso(0.036)
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's "&" ignores
+    try:
+        torso(0.036)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
