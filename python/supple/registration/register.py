@@ -5,8 +5,9 @@
 3. coarse     rigid, bones, scales
    facing     of those that face differently, the likeliest goes on
 4. landmarks  where asked for: nipples found on the scan join those given
-5. fine       all shapes, the robust threshold shrinking to the noise; landmarks that slid along
-              the skin are pulled to where the body's own shape tells them to be
+5. fine       all shapes, the robust threshold shrinking to the noise; arms that went elsewhere are
+              set again, and landmarks that slid along the skin are pulled to where the body's own
+              shape tells them to be
 6. offset     what bones and shapes cannot reach, smoothly
 7. judge      is the fit to be trusted, and if not, why
 """
@@ -24,6 +25,7 @@ import numpy.typing as npt
 from supple.errors import ConvergenceError, InputError
 from supple.registration import uncertainty
 from supple.registration.advice import advised, too_little
+from supple.registration.arm_search import settled_arms
 from supple.registration.body_prior import body_prior
 from supple.registration.found_landmarks import astray, found_landmarks, told_landmarks
 from supple.registration.initial_pose import Candidate, candidates
@@ -33,7 +35,7 @@ from supple.registration.posture import Posture
 from supple.registration.register_settings import RegisterSettings
 from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
-from supple.registration.rivals import Rival, contenders, decided
+from supple.registration.rivals import Rival, against, contenders, decided
 from supple.registration.template import Floats, Template
 from supple.registration.trust import doubts
 from supple.surface import Surface
@@ -103,8 +105,9 @@ def _stages(
     marks, sds = found_landmarks(scan, rig, first, named, keep) if tried else (
         named, dict.fromkeys(named, keep.landmark_sd))  # fmt: skip
     clock.stage("fine")
-    stages, rounds = (keep.fine, keep.told) if tried else (keep.warm, 0)
-    fit = _fine(rig, scan, first, stages, marks, sds, replace(keep, told=rounds))
+    stages = keep.fine if tried else keep.warm
+    quick = keep if tried else replace(keep, told=0, arms=())
+    fit = _fine(rig, scan, first, stages, marks, sds, quick)
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("judge")
@@ -188,12 +191,29 @@ def _fine(
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
     if len(stages) > 1 and keep.unlike > 0:
         fit = rig.fit(first, stages[:-1], keep.weights, loose, marks, sds, "pairs")
+        fit = _armed(rig, fit, stages[:-1], loose, marks, sds, keep)
         fit, marks, sds = _told(rig, scan, fit, stages[:-1], loose, marks, sds, keep)
         first, stages = fit.posture, stages[-1:]
         if fit.patch_sd > keep.follows:
             grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
             priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
     return rig.fit(first, stages, keep.weights, priors, marks, sds)
+
+
+def _armed(
+    rig: Rig, fit: RigFit, stages: tuple[Stage, ...], loose: Priors, marks: Mapping[str, Floats],
+    sds: Mapping[str, float], keep: RegisterSettings,
+) -> RigFit:  # fmt: skip
+    """``fit``, or one made anew with an arm elsewhere."""
+    if not keep.arms:
+        return fit
+    first = settled_arms(
+        fit, rig.template,
+        lambda start: rig.fit(start, keep.arms, keep.weights, loose, marks, sds, "lead"),
+    )  # fmt: skip
+    if first is None:
+        return fit
+    return rig.fit(first, stages, keep.weights, loose, marks, sds, "pairs")
 
 
 def _told(
@@ -224,7 +244,7 @@ def _coarse(rig: Rig, starts: list[Candidate], named: Mapping[str, Floats],
     if len(named) >= 3:
         near = starts[: keep.starts]
     fits = [_run(rig, one.posture, keep.coarse, named, keep) for one in near]
-    return sorted(fits, key=lambda fit: coarse_score(fit, keep.coarse[-1].reach))
+    return sorted(fits, key=against)
 
 
 def _rivals(
@@ -233,18 +253,12 @@ def _rivals(
     """The best of each facing, fitted loosely with all shapes; the likeliest first."""
     priors = keep.priors or Priors()
     loose = replace(priors, noise=max(priors.noise, keep.unlike))
-    scores = [coarse_score(fit, keep.coarse[-1].reach) for fit in tried]
     return decided(
-        list(zip(scores, tried, strict=True)), rig.template,
+        tried, rig.template,
         lambda fit: rig.fit(
             fit.posture, keep.face, keep.weights, loose, named, keep.landmark_sd, "lead"),
         keep,
     )  # fmt: skip
-
-
-def coarse_score(fit: RigFit, reach: float) -> float:
-    """Mean distance, m, of the thinned scan to the skin, where no partner counts as ``reach``."""
-    return float(np.where(np.isfinite(fit.distance), fit.distance, reach).mean())
 
 
 def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:

@@ -17,6 +17,8 @@ COARSE = (
 )  # fmt: skip
 #: All shapes, as far as it takes to tell one facing from another.
 FACE = (Stage("all", 4, 1e-3, 0.05, 0.015, 60.0, 0.3, 0.01, 4, 6),)
+#: An arm that was set elsewhere, in a body whose shapes are known.
+ARMS = (Stage("bones", 8, 2e-3, 0.08, 0.02, 70.0, 0.3, 0.03, 4, 8),)
 #: All shapes, down to the noise.
 FINE = (
     Stage("all", 8, 5e-4, 0.05, 0.015, 60.0, 0.3, 0.01, 3, 5),
@@ -37,6 +39,7 @@ class RegisterSettings:
     priors: Priors | None = None  #: how bodies differ; `body_prior` of the template
     coarse: tuple[Stage, ...] = COARSE
     face: tuple[Stage, ...] = FACE
+    arms: tuple[Stage, ...] = ARMS  #: none: arms stay where they went
     fine: tuple[Stage, ...] = FINE
     warm: tuple[Stage, ...] = WARM
     search: SearchSettings = field(default_factory=SearchSettings)
@@ -51,8 +54,8 @@ class RegisterSettings:
     slid: float = 15e-3  #: m; less than this is not worth another round
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
-    facing: float = 1.4  #: and one that faces otherwise within this; its coarse fit within
-    faced: float = 1.7  #: this factor goes on
+    facing: float = 1.4  #: and one that faces otherwise within this; its coarse fit goes on if
+    faced: float = 1.7  #: what speaks against it is within this factor
     turned: float = 0.9  #: rad between two facings
     doubts: Doubts = field(default_factory=Doubts)
     #: None: bones and shapes alone

@@ -77,18 +77,18 @@ def contenders(
 
 
 def decided(
-    coarse: Sequence[tuple[float, RigFit]], template: Template,
-    refit: Callable[[RigFit], RigFit], keep: RegisterSettings,
+    coarse: Sequence[RigFit], template: Template, refit: Callable[[RigFit], RigFit],
+    keep: RegisterSettings,
 ) -> list[Rival]:  # fmt: skip
     """The best of each facing, ``refit`` if there are more; the likeliest is first.
 
     Args:
-        coarse: scores and fits, best first.
+        coarse: fits, best first.
     """
     faces: list[RigFit] = []
-    for score, fit in coarse:
+    for fit in coarse:
         new = all(apart(fit.posture, one.posture, template) > keep.turned for one in faces)
-        if new and score <= keep.faced * coarse[0][0]:
+        if new and against(fit) <= keep.faced * against(coarse[0]):
             faces.append(fit)
     fits = [refit(one) for one in faces] if len(faces) > 1 else faces
     return sorted((Rival(fit, against(fit)) for fit in fits), key=lambda one: one.against)
