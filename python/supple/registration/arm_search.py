@@ -20,7 +20,7 @@ _RAISED, _FORWARD = (5.0, 150.0), 30.0
 #: Degrees from hanging where an arm is tried, if the other one does not tell.
 _TRIED = (30.0, 110.0)
 #: Energy, in that of the arm where it was, below which it is kept.
-_BETTER = 0.9
+_BETTER = 0.98
 _SIDES = ("left", "right")
 _IMAGE = np.diag([-1.0, 1.0, 1.0])
 

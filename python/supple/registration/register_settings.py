@@ -55,7 +55,7 @@ class RegisterSettings:
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival
     facing: float = 1.4  #: and one that faces otherwise within this; its coarse fit goes on if
-    faced: float = 1.7  #: what speaks against it is within this factor
+    faced: float = 2.0  #: what speaks against it is within this factor
     turned: float = 0.9  #: rad between two facings
     doubts: Doubts = field(default_factory=Doubts)
     #: None: bones and shapes alone
