@@ -26,7 +26,7 @@ from supple.errors import ConvergenceError, InputError
 from supple.registration import uncertainty
 from supple.registration.advice import advised, too_little
 from supple.registration.arm_search import settled_arms
-from supple.registration.body_prior import body_prior
+from supple.registration.body_prior import body_prior, prior_seen
 from supple.registration.found_landmarks import astray, found_landmarks, told_landmarks
 from supple.registration.initial_pose import Candidate, candidates
 from supple.registration.landmark_pose import posture_from_landmarks
@@ -92,8 +92,7 @@ def _stages(
     named = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
     rig = rig_of(template)
     _set_scan(rig, scan, keep)
-    if keep.priors is None:
-        keep = replace(keep, priors=body_prior(template))
+    ours, keep = keep.priors is None, _known(keep, template)
     clock.stage("start")
     starts = _starts(rig, named, keep, start)
     clock.stage("coarse")
@@ -102,6 +101,8 @@ def _stages(
     rivals = _rivals(rig, tried, named, keep)
     clock.stage("landmarks")
     first = rivals[0].fit.posture if rivals else starts[0].posture
+    if ours:
+        keep = replace(keep, priors=prior_seen(rig, first))
     marks, sds = found_landmarks(scan, rig, first, named, keep) if tried else (
         named, dict.fromkeys(named, keep.landmark_sd))  # fmt: skip
     clock.stage("fine")
@@ -113,6 +114,11 @@ def _stages(
     clock.stage("judge")
     held = set(template.landmarks) <= set(named)
     return _result(rig, scan, fit, moved, rivals, held, keep, clock)
+
+
+def _known(keep: RegisterSettings, template: Template) -> RegisterSettings:
+    """With priors."""
+    return keep if keep.priors is not None else replace(keep, priors=body_prior(template))
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
