@@ -37,7 +37,7 @@ from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
 from supple.registration.rivals import Rival, against, contenders, decided
 from supple.registration.template import Floats, Template
-from supple.registration.trust import doubts
+from supple.registration.trust import doubts, unlike
 from supple.surface import Surface
 
 __all__ = ["RegisterSettings", "register"]
@@ -228,11 +228,14 @@ def _told(
 ) -> tuple[RigFit, Mapping[str, Floats], Mapping[str, float]]:  # fmt: skip
     """The landmarks given, and those that the fit's own shape puts elsewhere.
 
-    Where they slid far, ``fit`` is made again with them, and asked once more.
+    Where they slid far, ``fit`` is made again with them, and asked once more. On a body that the
+    template can become nothing slides, and its own rest shape tells more than rules do.
     """
     marks, sds = dict(given), dict(given_sds)
     for left in reversed(range(keep.told)):
         moved = _offset(rig, fit, keep).vectors
+        if unlike(fit, moved) < keep.like:
+            break
         found, of_found, far = told_landmarks(
             scan, rig.template, fit.posture, moved, fit.points + moved, fit.vertex_used > 0, marks
         )

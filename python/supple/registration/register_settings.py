@@ -51,6 +51,7 @@ class RegisterSettings:
     found_sd: float = 8e-3  #: of a landmark that is found for certain
     found_reach: float = 50e-3  #: a landmark found further from the coarse fit is not used
     told: int = 1  #: rounds in which the body's own shape tells where its landmarks are
+    like: float = 0.45  #: of the noise, by which skin leaves a body that the template can become
     slid: float = 15e-3  #: m; less than this is not worth another round
     starts: int = 3  #: rival starts that are tried, at most
     rival: float = 1.15  #: a start whose score is within this factor of the best is a rival

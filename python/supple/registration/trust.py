@@ -62,8 +62,8 @@ def doubts(
     share = {side: float(seen[template.regions[f"breast_{side}"]].mean())
              for side in ("left", "right")}  # fmt: skip
     ratio = _rival(rivals)
-    away = float(np.sqrt((offset[seen] ** 2).sum(axis=1).mean())) if seen.any() else 0.0
-    unlike = away / max(fit.residual_sd, _QUIET)
+    away = _away(fit, offset)
+    left = unlike(fit, offset)
     shape = _deviations(fit.energy["blendshape"], 1)
     sizes = _deviations(fit.energy["scale"], 3 * len(template.bones))
     turns = _deviations(fit.energy["rotation"], 3 * len(template.bones))
@@ -84,11 +84,9 @@ def doubts(
         ),
         f"The skin had to leave what the template can become by {1e3 * away:.1f} mm (rms), more "
         f"than {1e3 * limits.offset:.1f} mm; check where the landmarks are.": away > limits.offset,
-        f"The skin had to leave what the template can become by {unlike:.2f} of the scan's noise, "
+        f"The skin had to leave what the template can become by {left:.2f} of the scan's noise, "
         f"more than {limits.unlike:g}; the body is unlike the template's, so that landmarks may "
-        "have slid: give all of them.": unlike > limits.unlike
-        and away <= limits.offset
-        and not held,
+        "have slid: give all of them.": left > limits.unlike and away <= limits.offset and not held,
         f"The scan shows a nipple {1e3 * astray:.0f} mm from where the fit has it, more than "
         f"{1e3 * limits.astray:.0f} mm; give landmarks.": astray > limits.astray,
         f"The bones' sizes are {sizes:.1f} standard deviations (rms) from a body's, more than "
@@ -104,6 +102,21 @@ def doubts(
         found[f"The scan shows {part:.0%} of the {side} breast, less than {limits.seen:.0%}; "
               "scan the front."] = part < limits.seen  # fmt: skip
     return [text for text, holds in found.items() if holds]
+
+
+def unlike(fit: RigFit, offset: Floats) -> float:
+    """How far seen skin leaves what bones and shapes can do, in standard deviations of the scan.
+
+    Args:
+        offset: (n, 3) m.
+    """
+    return _away(fit, offset) / max(fit.residual_sd, _QUIET)
+
+
+def _away(fit: RigFit, offset: Floats) -> float:
+    """Root mean square, m, of ``offset`` (n, 3) m where skin is seen."""
+    seen = fit.vertex_used > 0.05
+    return float(np.sqrt((offset[seen] ** 2).sum(axis=1).mean())) if seen.any() else 0.0
 
 
 def _at_bounds(fit: RigFit, bounds: Floats) -> float:
