@@ -36,7 +36,8 @@ def left_out(registration: Registration, given: Mapping[str, Floats], sd: float)
 
     Source: Cook and Weisberg (1982), Residuals and influence in regression, eq. 2.2.23.
     """
-    fit, marks = registration.fit, registration.landmarks
+    fit = registration.fit
+    marks = registration.template.landmark_points(fit.points)  # before the skin slid to them
     apart = np.array([at - marks[name] for name, at in given.items()])
     J = _moves(registration, list(given))
     leverage = J @ np.linalg.solve(fit.data_matrix + fit.prior_matrix, J.transpose(0, 2, 1)) / sd**2

@@ -9,7 +9,8 @@
               set again, and landmarks that slid along the skin are pulled to where the body's own
               shape tells them to be
 6. offset     what bones and shapes cannot reach, smoothly
-7. judge      is the fit to be trusted, and if not, why
+7. slide      along the skin, as far as landmarks are still off where they are known to be
+8. judge      is the fit to be trusted, and if not, why
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from supple.registration.register_settings import RegisterSettings
 from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
 from supple.registration.rivals import Rival, against, contenders, decided
+from supple.registration.slide import slide
 from supple.registration.template import Floats, Template
 from supple.registration.trust import doubts, unlike
 from supple.surface import Surface
@@ -108,12 +110,15 @@ def _stages(
     clock.stage("fine")
     stages = keep.fine if tried else keep.warm
     quick = keep if tried else replace(keep, told=0, arms=())
-    fit = _fine(rig, scan, first, stages, marks, sds, quick)
+    fit, marks, sds = _fine(rig, scan, first, stages, marks, sds, quick)
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
+    clock.stage("slide")
+    points = fit.points + moved.vectors
+    along = slide(template, fit.posture, points, moved.vectors, marks, sds)
     clock.stage("judge")
     held = set(template.landmarks) <= set(named)
-    return _result(rig, scan, fit, moved, rivals, held, keep, clock)
+    return _result(rig, scan, fit, moved, along, rivals, held, keep, clock)
 
 
 def _known(keep: RegisterSettings, template: Template) -> RegisterSettings:
@@ -187,7 +192,7 @@ def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str
 def _fine(
     rig: Rig, scan: Surface, first: Posture, stages: tuple[Stage, ...], marks: Mapping[str, Floats],
     sds: Mapping[str, float], keep: RegisterSettings,
-) -> RigFit:  # fmt: skip
+) -> tuple[RigFit, Mapping[str, Floats], Mapping[str, float]]:  # fmt: skip
     """All shapes; held loosely to the scan first, tightly once they turn out to follow it.
 
     A body that the template cannot become pulls its landmarks away if it is followed closely;
@@ -203,7 +208,7 @@ def _fine(
         if fit.patch_sd > keep.follows:
             grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
             priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
-    return rig.fit(first, stages, keep.weights, priors, marks, sds)
+    return rig.fit(first, stages, keep.weights, priors, marks, sds), marks, sds
 
 
 def _armed(
@@ -277,18 +282,18 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
 
 
 def _result(
-    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, rivals: list[Rival], held: bool,
-    keep: RegisterSettings, clock: _Clock,
+    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, along: Floats, rivals: list[Rival],
+    held: bool, keep: RegisterSettings, clock: _Clock,
 ) -> Registration:  # fmt: skip
     covariance = uncertainty.of_fit(fit, rig.template)
-    points = fit.points + moved.vectors
+    points = fit.points + moved.vectors + along
     off = astray(scan, rig.template, fit.posture, points, keep.doubts.sure) if rivals else 0.0
     warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off, held)
     history = [
         value for one in [*(rival.fit for rival in rivals[:1]), fit] for value in one.history
     ]
     return Registration(
-        rig.template, fit.posture, points, scan, moved.vectors,
+        rig.template, fit.posture, points, scan, moved.vectors + along,
         moved.precision, covariance, not warnings, warnings, clock.stop(), len(history), history,
         _reach(fit), fit,
     )  # fmt: skip

@@ -128,7 +128,7 @@ def evidence(
     hit = Surface(skin, template.triangles).closest(np.array([one[0] for one in wanted.values()]))
     corners = template.triangles[hit.triangle]
     places = np.einsum("kc,kcd->kd", hit.barycentric, points[corners])
-    near = _grown(template, _grown(template, seen))
+    near = grown(template, grown(template, seen))
     names = [name for name, on in zip(wanted, near[corners].any(axis=1), strict=True)
              if on or not wanted[name][2]]  # fmt: skip
     number = {name: i for i, name in enumerate(wanted)}
@@ -191,7 +191,7 @@ def _shown(template: Template, name: str, seen: npt.NDArray[np.bool_]) -> bool:
     return bool(seen[template.triangles[template.landmarks[name].triangle[0]]].any())
 
 
-def _grown(template: Template, seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def grown(template: Template, seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Vertices (n,) that share a triangle with one that is ``seen``."""
     grown = np.zeros_like(seen)
     grown[template.triangles[seen[template.triangles].any(axis=1)]] = True
