@@ -94,7 +94,8 @@ def _stages(
     named = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
     rig = rig_of(template)
     _set_scan(rig, scan, keep)
-    ours, keep = keep.priors is None, _known(keep, template)
+    ours = keep.priors is None
+    keep = replace(keep, priors=keep.priors or body_prior(template))
     clock.stage("start")
     starts = _starts(rig, named, keep, start)
     clock.stage("coarse")
@@ -110,20 +111,15 @@ def _stages(
     clock.stage("fine")
     stages = keep.fine if tried else keep.warm
     quick = keep if tried else replace(keep, told=0, arms=())
-    fit, marks, sds = _fine(rig, scan, first, stages, marks, sds, quick)
+    fit, known, of_known = _fine(rig, scan, first, stages, marks, sds, quick)
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("slide")
     points = fit.points + moved.vectors
-    along = slide(template, fit.posture, points, moved.vectors, marks, sds)
+    along = slide(template, fit.posture, points, moved.vectors, known, of_known)
     clock.stage("judge")
     held = set(template.landmarks) <= set(named)
     return _result(rig, scan, fit, moved, along, rivals, held, keep, clock)
-
-
-def _known(keep: RegisterSettings, template: Template) -> RegisterSettings:
-    """With priors."""
-    return keep if keep.priors is not None else replace(keep, priors=body_prior(template))
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
