@@ -19,6 +19,9 @@ _MEDIAL, _BEHIND = 0.3, 0.02
 #: m around the armpit's apex, where its front fold is; m from the shoulder's joint to the midline,
 #: where along the fold its landmark is: before the humeral head's inner half.
 _NEAR, _INNER = 0.08, 0.010
+#: m above the apex, round which the fold's skin runs; m by which skin may be behind the fold's
+#: foremost and still be its edge, whose middle counts: a mesh has the foremost anywhere on it.
+_WITHIN, _ROUND = 0.03, 4e-3
 
 
 def notch_height(points: Floats, nipple: float) -> float:
@@ -168,7 +171,13 @@ def fold_before(line: Floats, apex: Floats) -> Floats:
     """The edge (3,) m of the fold in a sagittal section ``line`` (k, 3) m near the ``apex``."""
     line = line[(line[:, 2] > apex[2] - _NEAR / 4) & (line[:, 1] < apex[1])]
     line = line[np.linalg.norm(line - apex, axis=1) < _NEAR]
-    return np.asarray(line[(line[:, 1] + line[:, 2]).argmin()])
+    centre = apex + (0.0, 0.0, _WITHIN)
+    line = line[np.argsort(np.arctan2(line[:, 2] - centre[2], centre[1] - line[:, 1]))]
+    back = line[:, 1] + line[:, 2]
+    length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+    weight = np.gradient(length) * np.exp((back.min() - back) / _ROUND)
+    middle = weight @ length / weight.sum()
+    return np.array([np.interp(middle, length, line[:, k]) for k in range(3)])
 
 
 def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
