@@ -32,7 +32,7 @@ def test_a_template_s_landmarks_are_where_the_rules_put_them(name, request):
     at, curves = template.landmark_points(), template.curve_points()
     top = notch_height(template.points, float(at["nipple_left"][2]))
     assert at["sternal_notch"][2] == pytest.approx(top, abs=6e-3)
-    edge = axilla(template.points, template.triangles)
+    edge = axilla(template.points, template.triangles, joint_of(template, "arm_left"))
     half = edge_at(template, at["axilla_left"]) / 2
     for side, sign in (("left", 1), ("right", -1)):
         assert np.linalg.norm(at[f"axilla_{side}"] - edge * (sign, 1, 1)) < half
@@ -51,6 +51,10 @@ def test_a_template_s_landmarks_are_where_the_rules_put_them(name, request):
         assert medial[0] < sign * at[f"nipple_{side}"][0] < lateral[0]
         under = fold_below(template.points, template.triangles, at[f"nipple_{side}"])
         assert np.linalg.norm(at[f"breast_inferior_{side}"] - under) < 6e-3
+
+
+def joint_of(template, name):
+    return next(np.array(bone.joint) for bone in template.bones if bone.name == name)
 
 
 def edge_at(template, place):
@@ -85,7 +89,10 @@ def test_the_axilla_is_the_front_edge_under_an_arch():
     a, b, c, d = k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]
     triangles = np.vstack([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
     r = 0.02 * np.sqrt(0.5)
-    assert np.allclose(axilla(points, triangles), (0.2, -r, 0.12 - r), atol=2e-3)
+    for joint in (0.21, 0.23):  # at the arch's top, and 2 cm beside it, where the roof is lower
+        edge = axilla(points, triangles, np.array([joint, 0.0, 0.2]))
+        lower = (joint - 0.21) ** 2 / 0.1
+        assert np.allclose(edge, (joint - 0.01, -r, 0.12 - r - lower), atol=2e-3)
 
 
 def test_the_fold_of_a_step_is_its_inner_corner():

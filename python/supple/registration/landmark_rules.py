@@ -16,8 +16,12 @@ _ARM = 30
 #: The medial edge of a breast, of its nipple's distance from the midline; m behind the fold, where
 #: the front of a section ends.
 _MEDIAL, _BEHIND = 0.3, 0.02
-#: m around the armpit's apex, where its front fold is.
-_NEAR = 0.08
+#: m around the armpit's apex, where its front fold is; m from the shoulder's joint to the midline,
+#: where along the fold its landmark is: before the humeral head's inner half.
+_NEAR, _INNER = 0.08, 0.010
+#: m above the apex, round which the fold's skin runs; m by which skin may be behind the fold's
+#: foremost and still be its edge, whose middle counts: a mesh has the foremost anywhere on it.
+_WITHIN, _ROUND = 0.03, 4e-3
 
 
 def notch_height(points: Floats, nipple: float) -> float:
@@ -145,22 +149,35 @@ def fold_of(line: Floats, nipple: Floats) -> Floats:
     return np.asarray(line[np.argmax(off[:, 1] * along[0] - off[:, 0] * along[1])])
 
 
-def axilla(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
+def axilla(points: Floats, triangles: npt.NDArray[np.int64], joint: Floats) -> Floats:
     """The edge (3,) m of the left anterior axillary fold, on an edge of the skin.
 
-    Straight before the armpit's apex, where the skin turns from facing down to facing forward: of
-    the sagittal section through the apex, the point furthest forward and down alike. The apex is
-    the saddle of the height between arm and trunk, for any body whose arms are away from it.
+    Before the armpit, where the skin turns from facing down to facing forward: of a sagittal
+    section, the point furthest forward and down alike. The fold is a ridge from chest to arm; the
+    section is 1 cm nearer to the midline than the shoulder's ``joint`` (3,) m. The armpit's apex,
+    the saddle of the height between arm and trunk, moves along that ridge by 1 mm for each degree
+    that a template's arms happen to be raised.
     """
     apex = armpit(points, triangles)
-    return fold_before(sagittal(points, triangles, float(apex[0])), apex)
+    return fold_before(sagittal(points, triangles, fold_aside(joint)), apex)
+
+
+def fold_aside(joint: Floats) -> float:
+    """How far aside, m, the fold's landmark is, from the left shoulder's ``joint`` (3,) m."""
+    return float(joint[0]) - _INNER
 
 
 def fold_before(line: Floats, apex: Floats) -> Floats:
-    """The edge (3,) m of the fold in a sagittal section ``line`` (k, 3) m through the ``apex``."""
+    """The edge (3,) m of the fold in a sagittal section ``line`` (k, 3) m near the ``apex``."""
     line = line[(line[:, 2] > apex[2] - _NEAR / 4) & (line[:, 1] < apex[1])]
     line = line[np.linalg.norm(line - apex, axis=1) < _NEAR]
-    return np.asarray(line[(line[:, 1] + line[:, 2]).argmin()])
+    centre = apex + (0.0, 0.0, _WITHIN)
+    line = line[np.argsort(np.arctan2(line[:, 2] - centre[2], centre[1] - line[:, 1]))]
+    back = line[:, 1] + line[:, 2]
+    length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+    weight = np.gradient(length) * np.exp((back.min() - back) / _ROUND)
+    middle = weight @ length / weight.sum()
+    return np.array([np.interp(middle, length, line[:, k]) for k in range(3)])
 
 
 def armpit(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:

@@ -88,7 +88,7 @@ def _template(base: BaseMesh, woman: Floats, half: Half) -> Template:
     full, nipple = (np.linalg.norm(target(name), axis=1) for name in (_FULL, _NIPPLE))
     breast = np.sqrt(full / full.max() * of_bone["breast_left"])
     outline = draw.smooth_outline(skin, skin.outline(breast, _OUTLINE, 96))
-    marks = draw.landmarks(skin, nipple)
+    marks = draw.landmarks(skin, nipple, rig.shoulder(base, woman))
     inside = (breast > _OUTLINE) & (points[:, 0] > 0)
     bones = rig.bones(base, woman, skin.at(outline).mean(axis=0))
     found = shapes(target, points, mirror, rig.moves(points, weights, bones))

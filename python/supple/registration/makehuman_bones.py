@@ -100,6 +100,11 @@ def bones(base: BaseMesh, points: Floats, breast: Floats) -> tuple[Bone, ...]:
     return tuple(result)
 
 
+def shoulder(base: BaseMesh, points: Floats) -> Floats:
+    """The left arm's joint (3,) m; ``points`` (n, 3) m of all the mesh."""
+    return np.asarray(points[base.joints()[_HEADS["arm_left"]]].mean(axis=0))
+
+
 def moves(points: Floats, weights: Floats, bones: tuple[Bone, ...]) -> Floats:
     """What each bone does to the skin (9 K, n, 3) m: shifts, turns and scales, to first order."""
     result = []

@@ -135,8 +135,8 @@ def smooth_outline(skin: Skin, line: Floats, waves: int = 5) -> OnSurface:
     return skin.nearest(smooth, closed=True)
 
 
-def landmarks(skin: Skin, nipple: Floats) -> dict[str, OnSurface]:
-    """LANDMARKS; ``nipple`` (n,) is how far its targets move.
+def landmarks(skin: Skin, nipple: Floats, joint: Floats) -> dict[str, OnSurface]:
+    """LANDMARKS; ``nipple`` (n,) is how far its targets move, ``joint`` (3,) m the left shoulder's.
 
     Nipple: the middle of what moves with the nipple's tip. Medial, lateral: the breast's edges at
     the nipple's height; inferior: the fold below the nipple. Xiphoid: on the profile, 0.9 of the
@@ -149,7 +149,7 @@ def landmarks(skin: Skin, nipple: Floats) -> dict[str, OnSurface]:
     medial, lateral = breast_edges(skin.points, skin.triangles, summit, fold)
     marks = {
         "nipple": skin.nearest(summit),
-        "axilla": skin.nearest(axilla(skin.points, skin.triangles)),
+        "axilla": skin.nearest(axilla(skin.points, skin.triangles, joint)),
         "breast_medial": skin.nearest(medial),
         "breast_lateral": skin.nearest(lateral),
         "breast_inferior": skin.nearest(fold),

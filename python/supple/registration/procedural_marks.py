@@ -10,6 +10,7 @@ from supple.registration.landmark_rules import (
     armpit,
     breast_edges,
     drawn_through,
+    fold_aside,
     fold_before,
     fold_of,
     notch_height,
@@ -33,7 +34,8 @@ def marks(skin: Skin) -> tuple[dict[str, OnSurface], dict[str, OnSurface]]:
              "sternum_arrow_upper": _arrow(skin, top, meet + 0.005),
              "sternum_arrow_lower": _arrow(skin, low, meet - 0.005)}  # fmt: skip
     apex = _saddle(armpit(skin.points, skin.triangles))
-    front = fold_before(_section(apex, -0.01, 0.08), apex)
+    beside = np.r_[fold_aside(body.SHOULDER), apex[1:]]
+    front = fold_before(_section(beside, -0.01, 0.08), apex)
     by_shape = {"breast_inferior_left": fold[None], "axilla_left": front[None]}
     for name, points in {**_left_places(skin, fold), **by_shape}.items():
         found[name] = _nearest(skin, points, closed=name == "breast_left")
