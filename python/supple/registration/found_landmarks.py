@@ -36,7 +36,7 @@ def found_landmarks(
     at = rig.template.landmark_points(rig.vertices(posture))
     for name, one in proposed(scan, rig.template, posture).items():
         near = np.linalg.norm(one.point - at[name]) < keep.found_reach if name in at else False
-        if near and name not in marks and one.confidence >= keep.sure and "nipple" in name:
+        if near and name not in marks and one.confidence >= keep.sure:
             marks[name], sds[name] = one.point, keep.found_sd / one.confidence
     return marks, sds
 
@@ -84,7 +84,7 @@ def _paired(template: Template, posture: Posture, steps: Mapping[str, Floats]) -
 
 
 def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, Proposal]:
-    """What the scan shows, seen from the front of the body that ``posture`` puts there."""
+    """Nipples that the scan shows, from the front of the body that ``posture`` puts there."""
     from supple.registration.auto_landmarks import propose
 
     names = [bone.name for bone in template.bones]
@@ -92,7 +92,7 @@ def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, P
         return {}
     chest = names.index("chest")
     R, joint = posture.rotations[chest], template.joints[chest]
-    return propose(scan, (R.T, joint - R.T @ (joint + posture.translations[chest])))
+    return propose(scan, (R.T, joint - R.T @ (joint + posture.translations[chest])), True)
 
 
 def astray(
@@ -103,5 +103,5 @@ def astray(
     return max(
         (float(np.linalg.norm(one.point - at[name]))
          for name, one in proposed(scan, template, posture).items()
-         if "nipple" in name and name in at and one.confidence >= sure), default=0.0,
+         if name in at and one.confidence >= sure), default=0.0,
     )  # fmt: skip

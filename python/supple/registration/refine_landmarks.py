@@ -38,7 +38,7 @@ def refine(scan: Surface, guesses: Mapping[str, npt.ArrayLike]) -> dict[str, Pro
     points = scan.points
     for name, guess in guesses.items():
         centre = np.asarray(guess, dtype=np.float64)
-        near = points[(np.abs(points - centre) < _AROUND).all(axis=1)]
+        near = _box(points, centre)
         if len(near) < 30:
             continue
         distance = float(cKDTree(near).query(centre)[0])
@@ -47,6 +47,13 @@ def refine(scan: Surface, guesses: Mapping[str, npt.ArrayLike]) -> dict[str, Pro
         tip = _tip(near, centre) if name.startswith("nipple") else None
         found[name] = tip or _on_skin(near, centre, distance)
     return found
+
+
+def _box(points: Floats, centre: Floats) -> Floats:
+    """Points of ``points`` (n, 3) m that are around ``centre`` (3,) m, axis by axis: it is fast."""
+    for axis in range(3):
+        points = points[np.abs(points[:, axis] - centre[axis]) < _AROUND]
+    return points
 
 
 def _on_skin(near: Floats, guess: Floats, distance: float) -> Proposal:
@@ -77,10 +84,10 @@ def _tip(near: Floats, guess: Floats) -> Proposal | None:
     noise = 1.4826 * float(np.median(np.abs(rest[ring])))
     grid = np.arange(-_REACH, _REACH + 1e-9, 1.5e-3)
     a, b = (g.ravel() for g in np.meshgrid(grid, grid))
-    weight = np.exp(-((u - a[:, None]) ** 2 + (v - b[:, None]) ** 2) / (2 * _TIP**2))
-    total = weight.sum(axis=1)
-    mean = (weight @ rest) / np.maximum(total, 1e-9)
-    error = noise * np.sqrt((weight**2).sum(axis=1)) / np.maximum(total, 1e-9)
+    across, up = (np.exp(-((x - grid[:, None]) ** 2) / (2 * _TIP**2)) for x in (u, v))
+    total = (up @ across.T).ravel()  # of a Gaussian about each place, the product of two
+    mean = (up @ (across * rest).T).ravel() / np.maximum(total, 1e-9)
+    error = noise * np.sqrt((up**2 @ (across**2).T).ravel()) / np.maximum(total, 1e-9)
     k = int(np.argmax(np.where(total > 5, mean, -np.inf)))
     times = float(mean[k] / max(error[k], 1e-5))
     if mean[k] < _LEAST or times < _TIMES or np.hypot(a[k], b[k]) > _REACH:

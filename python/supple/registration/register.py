@@ -9,7 +9,7 @@
               set again, and landmarks that slid along the skin are pulled to where the body's own
               shape tells them to be
 6. offset     what bones and shapes cannot reach, smoothly
-7. slide      along the skin, as far as landmarks are still off where they are known to be
+7. slide      along itself, the skin to landmarks that were given, for what is left
 8. judge      is the fit to be trusted, and if not, why
 """
 
@@ -58,8 +58,8 @@ def register(
     Args:
         scan: m, in any frame; triangles, or a cloud of points. More than the torso does no harm.
         template: the shipped one by default.
-        landmarks: name → (3,) m on the scan; they pull with ``settings.landmark_sd``, and three
-            or more give the initial pose.
+        landmarks: name → (3,) m on the scan, good to ``settings.landmark_sd``; they pull, the skin
+            slides to them, and three or more give the initial pose.
         start: a posture near the answer (the frame before): no search.
         progress: called with the name of each stage.
 
@@ -111,12 +111,12 @@ def _stages(
     clock.stage("fine")
     stages = keep.fine if tried else keep.warm
     quick = keep if tried else replace(keep, told=0, arms=())
-    fit, known, of_known = _fine(rig, scan, first, stages, marks, sds, quick)
+    fit = _fine(rig, scan, first, stages, marks, sds, quick)
     clock.stage("offset")
     moved = _offset(rig, fit, keep)
     clock.stage("slide")
     points = fit.points + moved.vectors
-    along = slide(template, fit.posture, points, moved.vectors, known, of_known)
+    along = slide(template, fit.posture, points, moved.vectors, named, keep.landmark_sd)
     clock.stage("judge")
     held = set(template.landmarks) <= set(named)
     return _result(rig, scan, fit, moved, along, rivals, held, keep, clock)
@@ -188,7 +188,7 @@ def _run(rig: Rig, start: Posture, stages: tuple[Stage, ...], named: Mapping[str
 def _fine(
     rig: Rig, scan: Surface, first: Posture, stages: tuple[Stage, ...], marks: Mapping[str, Floats],
     sds: Mapping[str, float], keep: RegisterSettings,
-) -> tuple[RigFit, Mapping[str, Floats], Mapping[str, float]]:  # fmt: skip
+) -> RigFit:  # fmt: skip
     """All shapes; held loosely to the scan first, tightly once they turn out to follow it.
 
     A body that the template cannot become pulls its landmarks away if it is followed closely;
@@ -204,7 +204,7 @@ def _fine(
         if fit.patch_sd > keep.follows:
             grade = min(1.0, 0.35 + fit.patch_sd / keep.follows - 1)
             priors = replace(priors, noise=max(priors.noise, grade * keep.unlike))
-    return rig.fit(first, stages, keep.weights, priors, marks, sds), marks, sds
+    return rig.fit(first, stages, keep.weights, priors, marks, sds)
 
 
 def _armed(

@@ -39,6 +39,8 @@ _PAIRED = 12e-3
 _TIP = 2e-3
 #: m (rms) over which a tip may spread: that of a flatter breast is anywhere, as noise has it.
 _FLAT = 11e-3
+#: m around a place, where the skin next to it is sought: more than the longest edge of a template.
+_PATCH = 40e-3
 
 
 @dataclass(frozen=True)
@@ -125,9 +127,8 @@ def evidence(
     wanted = _wanted(template, skin, seen, slid)
     if not wanted:
         return Evidence([], np.empty((0, 3)), [])
-    hit = Surface(skin, template.triangles).closest(np.array([one[0] for one in wanted.values()]))
-    corners = template.triangles[hit.triangle]
-    places = np.einsum("kc,kcd->kd", hit.barycentric, points[corners])
+    corners, shares = _landing(template, skin, np.array([one[0] for one in wanted.values()]))
+    places = np.einsum("kc,kcd->kd", shares, points[corners])
     near = grown(template, grown(template, seen))
     names = [name for name, on in zip(wanted, near[corners].any(axis=1), strict=True)
              if on or not wanted[name][2]]  # fmt: skip
@@ -135,6 +136,18 @@ def evidence(
     return Evidence(
         names, places[[number[name] for name in names]], [wanted[name][1] for name in names]
     )
+
+
+def _landing(template: Template, skin: Floats, places: Floats) -> tuple[Ints, Floats]:
+    """Vertices (k, 3) and barycentric (k, 3) of where ``places`` (k, 3) m land on ``skin``.
+
+    Only the triangles around them are asked, unless there are none.
+    """
+    apart = ((skin[:, None] - places) ** 2).sum(axis=2)
+    around = (apart < np.maximum(_PATCH**2, 4 * apart.min(axis=0))).any(axis=1)
+    part = template.triangles[around[template.triangles].any(axis=1)]
+    hit = Surface(skin, part).closest(places)
+    return part[hit.triangle], np.asarray(hit.barycentric)
 
 
 def _wanted(

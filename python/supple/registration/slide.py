@@ -1,8 +1,9 @@
-"""Skin moved along itself, so that its landmarks lie where they are known to be.
+"""Skin moved along itself, so that its landmarks lie where they were given.
 
-Distances to a scan say little of movements along the skin, so a fit leaves them to its shapes. What
-these leave of the steps to landmarks is closed by a smooth field u on the skin at rest, the mean of
-a Gaussian process given the steps d with their noise, after which each vertex returns to the skin:
+Distances to a scan say little of movements along the skin, so a fit leaves them to bones and
+shapes. What these leave of the steps to landmarks is closed by a smooth field u on the skin at
+rest, the mean of a Gaussian process given the steps d with their noise, after which each vertex
+returns to the skin:
 
     u(x) = k(x, X) (k(X, X) + σ²)⁻¹ d,   k(x, y) = s² ((1 − ρ/2) g(x − y) ± ρ/2 g(x − M y))
 
@@ -38,7 +39,7 @@ _STILL = 1e-4
 
 def slide(
     template: Template, posture: Posture, points: Floats, offset: Floats,
-    marks: Mapping[str, Floats], sds: Mapping[str, float],
+    marks: Mapping[str, Floats], sd: float,
 ) -> Floats:  # fmt: skip
     """By what the vertices (n, 3) m move along the skin.
 
@@ -46,7 +47,7 @@ def slide(
         points: (n, 3) m of the skin.
         offset: (n, 3) m of them, by which they are off what ``posture`` makes of the template.
         marks: name → (3,) m, where landmarks are to be.
-        sds: name → m, how well that is known.
+        sd: m, how well that is known, along each axis.
     """
     if not marks:
         return np.zeros_like(points)
@@ -56,7 +57,7 @@ def slide(
     steps = np.array([R.T @ (place - posed[name])
                       for R, (name, place) in zip(turns, marks.items(), strict=True)])  # fmt: skip
     places = np.array([at[name] for name in marks])
-    moved = field(skin, places, steps, np.array([sds[name] for name in marks]))
+    moved = field(skin, places, steps, sd)
     return _along(template, skin, moved * _free(template)[:, None], points)
 
 
@@ -110,18 +111,18 @@ def _free(template: Template) -> Floats:
     return np.asarray(1 - np.exp(-apart / (2 * (_RIM / 2) ** 2)))
 
 
-def field(points: Floats, places: Floats, steps: Floats, sds: Floats) -> Floats:
+def field(points: Floats, places: Floats, steps: Floats, sd: float) -> Floats:
     """The likeliest smooth displacement (n, 3) m at ``points`` (n, 3) m of a body at rest.
 
     Args:
         places: (k, 3) m, where it is known.
         steps: (k, 3) m, what it is there.
-        sds: (k,) m, standard deviations of that.
+        sd: m, standard deviation of that.
     """
     moved = np.empty_like(points)
     (own, image), (near, far) = _kernels(places, places), _kernels(points, places)
     for axis, sign in enumerate(_MIRROR):
-        known = own + sign * image + np.diag(sds**2)
+        known = own + sign * image + sd**2 * np.eye(len(places))
         moved[:, axis] = (near + sign * far) @ np.linalg.solve(known, steps[:, axis])
     return moved
 
