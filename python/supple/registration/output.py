@@ -213,7 +213,7 @@ def _picture(path: Path, outcome: Outcome) -> None:
     from supple.registration.report import body_frame
 
     fit = outcome.registration
-    doubt = "" if fit.trustworthy else f"Not trustworthy: {'; '.join(fit.warnings)}"
+    doubt = "" if fit.trustworthy else "\n".join(("Not trustworthy:", *fit.warnings))
     marks = {name: carried.points[0] for name, carried in outcome.landmarks.items()}
     draw_portrait(path, Portrait(outcome.scan, fit.points, body_frame(fit), outcome.curves, marks,
                                  outcome.title, doubt))  # fmt: skip
