@@ -27,7 +27,8 @@ def vertex_normals(points: Floats, triangles: Ints, smoothed: int = 0) -> Floats
                       u[0] * v[1] - u[1] * v[0]])  # fmt: skip
     normals = _gathered(cross, corners, len(points))
     for _ in range(smoothed):
-        normals = _gathered(sum(normals[:, ids] for ids in corners), corners, len(points))
+        a, b, c = (normals[:, ids] for ids in corners)
+        normals = _gathered(a + b + c, corners, len(points))
     return np.ascontiguousarray(normals.T)
 
 
