@@ -157,15 +157,39 @@ def check_unit(extent: float, unit: str, source: object) -> None:
 
 def _cross(points: Floats, triangles: Ints) -> Floats:
     """Twice the area times the normal (t, 3) of each triangle."""
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    return np.cross(b - a, c - a)
+    return np.asarray(_crossed(*_two_edges(points, triangles)).T)
+
+
+def _two_edges(points: Floats, triangles: Ints) -> tuple[Floats, Floats]:
+    """From the first corner of each triangle to its second and third, (3, t) each.
+
+    A coordinate is in one row: several times faster than ``np.cross`` of millions of triangles.
+    """
+    x = np.ascontiguousarray(points.T)
+    first, second, third = (np.ascontiguousarray(triangles[:, i]) for i in range(3))
+    a = np.take(x, first, axis=1)
+    return np.take(x, second, axis=1) - a, np.take(x, third, axis=1) - a
+
+
+def _crossed(u: Floats, v: Floats) -> Floats:
+    """Cross products of the columns of ``u`` and ``v`` (3, t)."""
+    result = np.empty_like(u)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        np.multiply(u[j], v[k], out=result[i])
+        result[i] -= u[k] * v[j]
+    return result
 
 
 def flat(points: Floats, triangles: Ints) -> npt.NDArray[np.bool_]:
     """Which triangles (t,) have no area beyond the rounding of their edges."""
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    longest = np.maximum(((b - a) ** 2).sum(axis=1), ((c - a) ** 2).sum(axis=1))
-    return np.asarray(np.linalg.norm(_cross(points, triangles), axis=1) <= 1e-12 * longest)
+    u, v = _two_edges(points, triangles)
+    longest = np.maximum(_squared(u), _squared(v))
+    return np.asarray(np.sqrt(_squared(_crossed(u, v))) <= 1e-12 * longest)
+
+
+def _squared(u: Floats) -> Floats:
+    return np.asarray(np.einsum("dt,dt->t", u, u))
 
 
 def _ply(

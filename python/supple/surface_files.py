@@ -72,6 +72,9 @@ def _joined(parts: Sequence[Any]) -> tuple[Floats, Ints]:
             continue
         own = np.asarray(part.vertices, dtype=np.float64).reshape(-1, 3)
         faces = np.asarray(getattr(part, "faces", ()), dtype=np.int64).reshape(-1, 3)
+        if len(parts) > 1 and len(faces):  # each object of an OBJ holds the points of all
+            used, faces = np.unique(faces, return_inverse=True)
+            own, faces = own[used], faces.reshape(-1, 3)
         triangles.append(faces + count)
         points.append(own)
         count += len(own)

@@ -180,6 +180,21 @@ def test_a_fit_that_is_not_trustworthy_is_written_marked_and_exits_with_3(
     assert json.loads((tmp_path / "out" / "result.json").read_text())["not_trustworthy"]
 
 
+def test_a_scan_of_the_back_does_not_carry_the_drawing(
+    scan: SyntheticScan, tmp_path: Path, truth: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """However well the template fits: its front, where the drawing is, was not seen."""
+    monkeypatch.setattr(register_module, "register", truth(True))
+    back = scan.surface.normals @ scan.truth.R[:, 1] > 0.3
+    Surface(scan.surface.points, scan.surface.triangles[back]).write(tmp_path / "scan.ply")
+    assert run(tmp_path, tmp_path / "out") == 3
+    printed = capsys.readouterr()
+    assert re.search(r"Only \d+% of the drawing lies on the scan, less than 25%", printed.err)
+    assert re.search(r"note: \d+ points of \d+ are in no triangle: left out", printed.out)
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["not_trustworthy"]
+
+
 @pytest.mark.usefixtures("no_fit")
 @pytest.mark.parametrize(
     ("arguments", "match"),

@@ -352,6 +352,41 @@ def test_seams_doubles_and_flat_triangles_are_mended():
     assert said == ["1 triangles without area are left out."]
 
 
+def test_points_that_a_cut_left_behind_are_no_skin(tmp_path):
+    """Faces deleted in an editor, their points not: half a body must be read as half of one."""
+    points, triangles = body()
+    kept = triangles[points[triangles].mean(axis=1)[:, 1] > np.median(points[:, 1])]
+    scan = read_scan(ply(tmp_path / "s.ply", points, kept))
+    held = len(np.unique(kept))
+    assert len(scan.surface.points) == held
+    assert len(scan.surface.triangles) == len(kept)
+    lost, every = len(points) - held, len(points)
+    assert f"{lost} points of {every} are in no triangle: left out." in scan.said
+
+
+def test_objects_of_an_obj_share_its_points_and_lose_none(tmp_path):
+    """Two objects over one list of points, as scanners and Blender write them: nothing is loose."""
+    points, triangles = body()
+    half = len(triangles) // 2
+    lines = ["v {} {} {}".format(*(1e3 * p)) for p in points]
+    for name, some in (("a", triangles[:half]), ("b", triangles[half:])):
+        lines += [f"o {name}", f"usemtl {name}"]
+        lines += ["f {} {} {}".format(*(1 + t)) for t in some]
+    (tmp_path / "s.obj").write_text("\n".join(lines))
+    scan = read_scan(tmp_path / "s.obj")
+    assert len(scan.surface.points) == len(points)
+    assert len(scan.surface.triangles) == len(triangles)
+    assert not any("left out" in s for s in scan.said)
+
+
+def test_a_cloud_with_few_triangles_stays_a_cloud(tmp_path):
+    points, triangles = body()
+    scan = read_scan(ply(tmp_path / "s.ply", points, triangles[:20]))
+    assert len(scan.surface.points) == len(points)
+    assert len(scan.surface.triangles) == 0
+    assert any("taken as a cloud of points" in s for s in scan.said)
+
+
 def test_a_cloud_stays_a_cloud(tmp_path):
     points, _ = body()
     scan = read_scan(

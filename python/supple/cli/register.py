@@ -103,7 +103,7 @@ def fitted(
 
     from ..registration.landmark_check import check_on_scan
     from ..registration.landmark_files import read_landmarks
-    from ..registration.output import Outcome, read_posture
+    from ..registration.output import Outcome, judged, read_posture
     from ..registration.register import RegisterSettings
     from ..registration.register import register as work
     from ..registration.scan_file import read_scan
@@ -120,7 +120,7 @@ def fitted(
     settings = RegisterSettings()
     fit = work(found.surface, torso, given or None, settings, posture, run.progress)
     weights = asdict(settings.weights) if hasattr(settings, "weights") else {}
-    return Outcome(fit, found.surface, given, scan.name, said, weights, found.unit)
+    return judged(Outcome(fit, found.surface, given, scan.name, said, weights, found.unit))
 
 
 def chosen(file: Path | None) -> Template:

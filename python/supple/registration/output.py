@@ -9,7 +9,7 @@ import csv
 import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 Place = Callable[[str], Path]
+
+#: Least share of the drawing that lies on a scan of the front, a third of which may be holes.
+_DRAWN = 0.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,6 +96,20 @@ class Outcome:
             "seconds": dict(fit.seconds),
             "versions": versions(),
         }
+
+
+def judged(outcome: Outcome) -> Outcome:
+    """Not to be trusted where hardly any of the drawing lies on the scan: the back was scanned."""
+    if not len(outcome.scan.triangles):
+        return outcome
+    share = float(np.concatenate([c.on_scan for c in outcome.curves.values()]).mean())
+    if share >= _DRAWN:
+        return outcome
+    warning = (f"Only {np.floor(100 * share):.0f}% of the drawing lies on the scan, less than "
+               f"{_DRAWN:.0%}; scan the front.")  # fmt: skip
+    fit = outcome.registration
+    doubted = replace(fit, trustworthy=False, warnings=[*fit.warnings, warning])
+    return replace(outcome, registration=doubted)
 
 
 def write(outcome: Outcome, place: Place) -> None:
@@ -213,7 +230,7 @@ def _picture(path: Path, outcome: Outcome) -> None:
     from supple.registration.report import body_frame
 
     fit = outcome.registration
-    doubt = "" if fit.trustworthy else f"Not trustworthy: {'; '.join(fit.warnings)}"
+    doubt = "" if fit.trustworthy else "\n".join(("Not trustworthy:", *fit.warnings))
     marks = {name: carried.points[0] for name, carried in outcome.landmarks.items()}
     draw_portrait(path, Portrait(outcome.scan, fit.points, body_frame(fit), outcome.curves, marks,
                                  outcome.title, doubt))  # fmt: skip

@@ -26,6 +26,8 @@ PEN, MARK, INK = "#7a1fa2", "#0b5c8a", "#14232e"
 _SKIN = ("#5b4a42", "#a98a78", "#e3c8b6", "#f7e9de")
 #: The picture's width, inches, and dots an inch.
 _WIDTH, _DPI = 8.0, 110
+#: Height of the title and of a line of the warning, inches, and that line's length in letters.
+_TITLE, _LINE, _LETTERS = 0.4, 0.17, 104
 #: What is shown around the registered skin, and the scale bar, m.
 _MARGIN, _BAR = 0.03, 0.05
 
@@ -41,7 +43,7 @@ class Portrait:
         curves: the drawing on the scan.
         landmarks: name → (3,).
         title: above the picture.
-        warning: in red above it; empty where the fit is trustworthy.
+        warning: in red below the title, a sentence a line; empty where the fit is trustworthy.
     """
 
     scan: Surface
@@ -67,14 +69,16 @@ def draw_portrait(path: str | Path, portrait: Portrait) -> Path:
         raise InputError(f"a picture needs a name in .png or .svg, got {file.name}.")
     low, high = _box(portrait)
     wide, tall = high - low
-    figure = Figure(figsize=(_WIDTH, _WIDTH * tall / wide + 0.7), dpi=_DPI)
+    words = _lines(portrait.warning)
+    above = _TITLE + _LINE * len(words) + 0.1
+    figure = Figure(figsize=(_WIDTH, _WIDTH * tall / wide + above), dpi=_DPI)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, _WIDTH * tall / wide / figure.get_figheight()))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set_axis_off()
     _scan(axes, portrait, low, high)
     _drawing(axes, portrait)
-    _signs(figure, axes, portrait, low, high)
+    _signs(figure, axes, portrait.title, words, low)
     figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
     return file
 
@@ -152,7 +156,13 @@ def _drawing(axes: Any, portrait: Portrait) -> None:
 _PAPER = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.65}
 
 
-def _signs(figure: Any, axes: Any, portrait: Portrait, low: Floats, high: Floats) -> None:
+def _lines(text: str) -> list[str]:
+    from textwrap import wrap
+
+    return [part for line in text.splitlines() for part in wrap(line, _LETTERS)]
+
+
+def _signs(figure: Any, axes: Any, title: str, warning: list[str], low: Floats) -> None:
     """Sides, a scale bar, the title, and what is wrong."""
     for x, letter, side in ((0.02, "R", "left"), (0.98, "L", "right")):
         axes.text(x, 0.97, letter, transform=axes.transAxes, fontsize=22, weight="bold",
@@ -163,8 +173,8 @@ def _signs(figure: Any, axes: Any, portrait: Portrait, low: Floats, high: Floats
     axes.text(x + bar / 2, y + 4, f"{bar:.0f} mm", fontsize=9, color=INK, ha="center")
     axes.text(0.98, 0.015, "seen from the front; R and L are the patient's; research use only",
               transform=axes.transAxes, fontsize=7, color=INK, ha="right", bbox=_PAPER)  # fmt: skip
-    top = 1 - 0.08 / figure.get_figheight()
-    figure.text(0.02, top, portrait.title, fontsize=12, weight="bold", color=INK, va="top")
-    if portrait.warning:
-        figure.text(0.02, top - 0.3 / figure.get_figheight(), portrait.warning, fontsize=9,
-                    weight="bold", color="#b3122b", va="top", wrap=True)  # fmt: skip
+    inch = 1 / figure.get_figheight()
+    figure.text(0.02, 1 - 0.08 * inch, title, fontsize=12, weight="bold", color=INK, va="top")
+    for row, line in enumerate(warning):
+        figure.text(0.02, 1 - (_TITLE + row * _LINE) * inch, line, fontsize=8.5, weight="bold",
+                    color="#b3122b", va="top")  # fmt: skip

@@ -23,6 +23,8 @@ Mask = npt.NDArray[np.bool_]
 
 #: Least number of points of a scan, and largest share of them that may be no numbers.
 LEAST, LOST = 200, 0.01
+#: Least share of the points that a surface's triangles name.
+_CLOUD = 0.1
 #: Extent, m, beyond which nothing is a scan of a body in metres.
 _EXTENT = (0.1, 3.0)
 #: Points closer than this are one, m: the least step that files of four decimals of a mm hold.
@@ -38,7 +40,8 @@ def tidy(points: npt.ArrayLike, triangles: npt.ArrayLike, source: str = "the sca
     """Points and triangles that a Surface can hold, and what was left out.
 
     Args:
-        points: (n, 3), any unit; NaN and infinity are dropped up to 1 %.
+        points: (n, 3), any unit; NaN and infinity are dropped up to 1 %, and so are those of no
+            triangle, where there are triangles.
         triangles: (t, 3) rows of points, or none.
         source: what messages call the scan.
 
@@ -68,7 +71,25 @@ def tidy(points: npt.ArrayLike, triangles: npt.ArrayLike, source: str = "the sca
     if none.any():
         said.append(f"{int(none.sum())} triangles without area are left out.")
         faces = faces[~none]
-    return xyz, faces, said
+    xyz, faces, loose = _tied(xyz, faces)
+    return xyz, faces, [*said, *loose]
+
+
+def _tied(points: Floats, triangles: Ints) -> tuple[Floats, Ints, list[str]]:
+    """Without points of no triangle: what was cut from a surface may have left its points behind.
+
+    A cloud with a few triangles stays a cloud.
+    """
+    corners, count = np.zeros(len(points), dtype=bool), len(points)
+    corners[triangles] = True
+    held = int(corners.sum())
+    if held in (0, count):
+        return points, triangles, []
+    if held < max(LEAST, _CLOUD * count):
+        said = f"Only {held} points of {count} are in triangles: taken as a cloud of points."
+        return points, triangles[:0], [said]
+    said = f"{count - held} points of {count} are in no triangle: left out."
+    return *_used(points, triangles), [said]
 
 
 def clean(surface: Surface) -> tuple[Surface, list[str]]:

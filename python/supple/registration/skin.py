@@ -19,18 +19,23 @@ def vertex_normals(points: Floats, triangles: Ints, smoothed: int = 0) -> Floats
     Args:
         smoothed: how often to take the mean over each triangle, and of those again.
     """
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    normals = _gathered(np.cross(b - a, c - a), triangles, len(points))
+    corners = np.ascontiguousarray(triangles.T)
+    x = np.ascontiguousarray(points.T)
+    a = x[:, corners[0]]
+    u, v = x[:, corners[1]] - a, x[:, corners[2]] - a
+    cross = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                      u[0] * v[1] - u[1] * v[0]])  # fmt: skip
+    normals = _gathered(cross, corners, len(points))
     for _ in range(smoothed):
-        normals = _gathered(normals[triangles].mean(axis=1), triangles, len(points))
-    return normals
+        a, b, c = (normals[:, ids] for ids in corners)
+        normals = _gathered(a + b + c, corners, len(points))
+    return np.ascontiguousarray(normals.T)
 
 
-def _gathered(of_triangles: Floats, triangles: Ints, count: int) -> Floats:
-    """Unit sums (n, 3) at the corners of what triangles (t, 3) have."""
-    own, whole = triangles.ravel(), np.repeat(of_triangles, 3, axis=0)
-    sums = np.stack([np.bincount(own, whole[:, k], count) for k in range(3)], axis=1)
-    length = np.linalg.norm(sums, axis=1, keepdims=True)
+def _gathered(of_triangles: Floats, corners: Ints, count: int) -> Floats:
+    """Unit sums (3, n) at the corners (3, t) of what triangles have (3, t)."""
+    sums = np.stack([sum(np.bincount(ids, row, count) for ids in corners) for row in of_triangles])
+    length = np.sqrt((sums**2).sum(axis=0))
     return np.asarray(sums / np.where(length > 0, length, 1.0))
 
 

@@ -72,8 +72,8 @@ def doubts(
         f"{1e3 * limits.residual:.0f} mm; check that it shows a bare torso, in metres.": (
             fit.residual_sd > limits.residual
         ),
-        f"Only {used:.0%} of the scan are this body's skin, less than {limits.on_skin:.0%}; "
-        "cut away what is not the torso.": used < limits.on_skin,
+        f"Only {np.floor(100 * used):.0f}% of the scan are this body's skin, less than "
+        f"{limits.on_skin:.0%}; cut away what is not the torso.": used < limits.on_skin,
         f"The standard deviation of the breasts is {1e3 * sd:.0f} mm, more than "
         f"{1e3 * limits.sd:.0f} mm; scan more of the front, or give landmarks.": sd > limits.sd,
         f"{bounds:.0%} of the shapes are at their bounds, more than {limits.at_bounds:.0%}; "
