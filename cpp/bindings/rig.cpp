@@ -216,8 +216,9 @@ void bind_rig(py::module_& module) {
       .def(py::init([](std::shared_ptr<Rig> rig) { return std::make_unique<RigFit>(rig); }))
       .def(
           "set_scan",
-          [](RigFit& fit, const Points& points, const supple::Triangles& triangles,
-             const Points& normals, double voxel, bool thin, double gap) {
+          [](RigFit& fit, const supple::GivenPoints& points,
+             const supple::GivenTriangles& triangles, const supple::GivenPoints& normals,
+             double voxel, bool thin, double gap) {
             supple::ScanSettings settings{voxel, thin};
             settings.gap = gap;
             fit.set_scan(points, triangles, normals, settings);

@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <Eigen/Eigenvalues>
+#include <numeric>
+
+#include "lane_bits.hpp"
 
 namespace supple {
 namespace {
@@ -67,8 +70,8 @@ class Near {
         for (std::size_t e = c; e < 3; ++e)
           second[to++] += weighted * d[e];
       }
-      for (std::size_t k = 0; k < kLanes; ++k)
-        if (squared[k] <= gap * gap) link(number_[i * kLanes + k]);
+      each_bit(bits_of(squared <= gap * gap),
+               [&](std::size_t k) { link(number_[i * kLanes + k]); });
     }
     Moments m{total(all), total(count), Vec3::Zero(), Vec3::Zero(), Eigen::Matrix3d::Zero()};
     std::size_t from = 0;

@@ -12,6 +12,8 @@ using Index = Eigen::Index;
 constexpr double kDegree = 0.017453292519943295;
 /// Of so many vertices, one is held against sliding for all.
 constexpr std::size_t kSlide = 4;
+/// Points that follow each other, of which each helps the next to land.
+constexpr std::size_t kRun = 64;
 
 /// Mean of the two normals, so that the residual vanishes for any two points of one sphere: the
 /// curvature of a surface is no residual. Zero where the normals contradict each other.
@@ -101,12 +103,16 @@ std::vector<Landing> Matcher::land_scan(const Points& vertices, double reach) {
 void Matcher::land_each(double reach, std::size_t every) {
   landed_.resize((hint_.size() + every - 1) / every);
   landed_reach_ = reach;
+  const std::size_t runs = (landed_.size() + kRun - 1) / kRun;
 #pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < landed_.size(); ++i) {
-    int& hint = hint_[i * every];
-    landed_[i] =
-        skin_.closest(scan_->points.row(static_cast<Index>(i * every)).transpose(), reach, hint);
-    if (landed_[i].leaf >= 0) hint = landed_[i].leaf;
+  for (std::size_t run = 0; run < runs; ++run) {
+    int near = -1; // where the point before landed, which is not far
+    for (std::size_t i = run * kRun; i < std::min(landed_.size(), (run + 1) * kRun); ++i) {
+      int& hint = hint_[i * every];
+      landed_[i] = skin_.closest(scan_->points.row(static_cast<Index>(i * every)).transpose(),
+                                 reach, hint < 0 ? near : hint);
+      if (landed_[i].leaf >= 0) hint = near = landed_[i].leaf;
+    }
   }
 }
 

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "lane_bits.hpp"
+
 namespace supple {
 namespace {
 
@@ -189,13 +191,12 @@ Landing SkinTree::closest(const Vec3& q, double reach, int hint) const {
     Lanes squared;
     wide.measure(q, squared);
     const std::size_t from = top;
-    for (int k = 0; k < kLanes; ++k) {
-      if (!(squared[k] < best.squared)) continue;
+    each_bit(bits_of(squared < best.squared), [&](std::size_t k) {
       std::size_t at = top++; // the nearest on top
       for (; at > from && stack[at - 1].squared < squared[k]; --at)
         stack[at] = stack[at - 1];
       stack[at] = {squared[k], wide.child[k]};
-    }
+    });
   }
   return best;
 }
@@ -231,14 +232,14 @@ void SkinTree::visit(const Vec3& q, int number, Landing& best) const {
     const Lanes gap = aq[d] - v * leaf.ab[d] - w * leaf.ac[d];
     squared += gap * gap;
   }
-  for (int k = 0; k < kLanes; ++k) {
-    if (!(squared[k] < best.squared || (squared[k] == best.squared && best.triangle < 0))) continue;
+  each_bit(bits_of(squared <= best.squared), [&](std::size_t k) {
+    if (!(squared[k] < best.squared || (squared[k] == best.squared && best.triangle < 0))) return;
     best.triangle = leaf.triangle[k];
     best.squared = squared[k];
     best.leaf = number;
     const bool opposite = !inside[k] && !along_b[k] && !along_c[k];
     best.barycentric = Vec3(opposite ? 0.0 : 1.0 - v[k] - w[k], v[k], w[k]);
-  }
+  });
 }
 
 } // namespace supple
