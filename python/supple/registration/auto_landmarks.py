@@ -58,7 +58,9 @@ class Proposal:
 
 
 def propose(
-    scan: Surface, frame: tuple[npt.ArrayLike, npt.ArrayLike] | None = None
+    scan: Surface,
+    frame: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+    nipples_only: bool = False,
 ) -> dict[str, Proposal]:
     """Landmarks of the front of a torso, by name; those that do not show are missing.
 
@@ -66,6 +68,7 @@ def propose(
         scan: a surface or a cloud, m.
         frame: R (3, 3) and t (3,) that carry the scan roughly (20°) into LPS, upright; by default
             the scan is so already.
+        nipples_only: the others, which take time, are not asked for.
     """
     R0, t0 = (np.eye(3), np.zeros(3)) if frame is None else map(np.asarray, frame)
     points = scan.points[:: max(1, len(scan.points) // _POINTS)] @ R0.T + t0
@@ -74,17 +77,17 @@ def propose(
     plane = square_up(points)
     R, t = plane.R @ R0, plane.R @ t0 + plane.t
     points = points @ plane.R.T + plane.t
-    found = _found(points, plane.likeness)
+    found = _found(points, plane.likeness, nipples_only)
     return {name: Proposal(R.T @ (p.point - t), p.confidence, p.found_by)
             for name, p in found.items()}  # fmt: skip
 
 
-def _found(points: Floats, likeness: float) -> dict[str, Proposal]:
+def _found(points: Floats, likeness: float, nipples_only: bool) -> dict[str, Proposal]:
     """Proposals in the frame whose plane of symmetry is x = 0."""
     sides = [_mounds(points, sign) for sign in (1.0, -1.0)]
     found = _nipples(sides[0], sides[1], likeness)
-    if not found:
-        return {}
+    if nipples_only or not found:
+        return found
     front = seen_along(points, FRONT)
     level = float(np.mean([p.point[2] for p in found.values()]))
     sure = float(np.mean([p.confidence for p in found.values()]))

@@ -7,7 +7,7 @@
 4. landmarks  where asked for: nipples found on the scan join those given
 5. fine       all shapes, the robust threshold shrinking to the noise; landmarks that slid along
               the skin are pulled to where the body's own shape tells them to be
-6. offset     what bones and shapes cannot reach, smoothly
+6. offset     what bones and shapes cannot reach, smoothly; beside it, how sure they are
 7. judge      is the fit to be trusted, and if not, why
 """
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -106,10 +107,13 @@ def _stages(
     stages, rounds = (keep.fine, keep.told) if tried else (keep.warm, 0)
     fit = _fine(rig, scan, first, stages, marks, sds, replace(keep, told=rounds))
     clock.stage("offset")
-    moved = _offset(rig, fit, keep)
+    with ThreadPoolExecutor(1) as aside:  # each is the work of one processor
+        moving = aside.submit(_offset, rig, fit, keep)
+        covariance = uncertainty.of_fit(fit, template)
+        moved = moving.result()
     clock.stage("judge")
     held = set(template.landmarks) <= set(named)
-    return _result(rig, scan, fit, moved, rivals, held, keep, clock)
+    return _result(rig, scan, fit, moved, covariance, rivals, held, keep, clock)
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
@@ -254,10 +258,9 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
 
 
 def _result(
-    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, rivals: list[Rival], held: bool,
-    keep: RegisterSettings, clock: _Clock,
+    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, covariance: Floats, rivals: list[Rival],
+    held: bool, keep: RegisterSettings, clock: _Clock,
 ) -> Registration:  # fmt: skip
-    covariance = uncertainty.of_fit(fit, rig.template)
     points = fit.points + moved.vectors
     off = astray(scan, rig.template, fit.posture, points, keep.doubts.sure) if rivals else 0.0
     warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off, held)
