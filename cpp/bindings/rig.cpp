@@ -198,7 +198,7 @@ void bind_rig_itself(py::module_& module) {
            })
       .def("vertex_sd",
            [](const Rig& rig, const Array& R, const Points& t, const Points& s, const VectorXd& b,
-              const Eigen::MatrixXd& covariance, const Eigen::VectorXi& of) {
+              const Eigen::Ref<const Eigen::MatrixXd>& covariance, const Eigen::VectorXi& of) {
              const RigPosture at = posture(R, t, s, b);
              return unlocked<VectorXd>([&] { return rig.vertex_sd(at, covariance, of); });
            });

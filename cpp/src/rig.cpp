@@ -110,7 +110,8 @@ RowMatrix Rig::jacobian(const RigPosture& posture) const {
   return J;
 }
 
-Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture, const Eigen::MatrixXd& covariance,
+Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture,
+                               const Eigen::Ref<const Eigen::MatrixXd>& covariance,
                                const Eigen::VectorXi& of) const {
   check(posture);
   require_size("covariance's rows", covariance.rows(), unknowns(), "one row an unknown");

@@ -129,30 +129,35 @@ void SkinTree::fill(const Points& points, Leaf& leaf) const {
   }
 }
 
-void SkinTree::refit(const Points& points) {
-  for (std::size_t n = nodes_.size(); n-- > 0;) { // children stand behind their parents
-    Node& node = nodes_[n];
-    Box& box = node.box;
-    if (node.leaf < 0) {
-      const Box& one = nodes_[n + 1].box;
-      const Box& other = nodes_[static_cast<std::size_t>(node.right)].box;
-      for (int d = 0; d < 3; ++d) {
-        box.low[d] = std::min(one.low[d], other.low[d]);
-        box.high[d] = std::max(one.high[d], other.high[d]);
+/// A leaf and the box around its triangles.
+void SkinTree::refit_leaf(const Points& points, Node& node) {
+  Leaf& leaf = leaves_[static_cast<std::size_t>(node.leaf)];
+  Box& box = node.box;
+  fill(points, leaf);
+  for (int d = 0; d < 3; ++d) {
+    box.low[d] = std::numeric_limits<double>::infinity();
+    box.high[d] = -box.low[d];
+    for (int k = 0; k < kLanes; ++k)
+      for (int c = 0; c < 3; ++c) {
+        const double x = points(triangles_(leaf.triangle[k], c), d);
+        box.low[d] = std::min(box.low[d], x);
+        box.high[d] = std::max(box.high[d], x);
       }
-      continue;
-    }
-    Leaf& leaf = leaves_[static_cast<std::size_t>(node.leaf)];
-    fill(points, leaf);
+  }
+}
+
+void SkinTree::refit(const Points& points) {
+#pragma omp parallel for schedule(static)
+  for (std::size_t n = 0; n < nodes_.size(); ++n)
+    if (nodes_[n].leaf >= 0) refit_leaf(points, nodes_[n]);
+  for (std::size_t n = nodes_.size(); n-- > 0;) { // children stand behind their parents
+    if (nodes_[n].leaf >= 0) continue;
+    Box& box = nodes_[n].box;
+    const Box& one = nodes_[n + 1].box;
+    const Box& other = nodes_[static_cast<std::size_t>(nodes_[n].right)].box;
     for (int d = 0; d < 3; ++d) {
-      box.low[d] = std::numeric_limits<double>::infinity();
-      box.high[d] = -box.low[d];
-      for (int k = 0; k < kLanes; ++k)
-        for (int c = 0; c < 3; ++c) {
-          const double x = points(triangles_(leaf.triangle[k], c), d);
-          box.low[d] = std::min(box.low[d], x);
-          box.high[d] = std::max(box.high[d], x);
-        }
+      box.low[d] = std::min(one.low[d], other.low[d]);
+      box.high[d] = std::max(one.high[d], other.high[d]);
     }
   }
   for (Wide& wide : wide_)

@@ -63,7 +63,7 @@ ResidualRings residual_rings(const Points& points, const Eigen::VectorXd& residu
   return sums[0];
 }
 
-Eigen::MatrixXd inverse_sum(const Eigen::MatrixXd& data, const Eigen::MatrixXd& prior) {
+Eigen::MatrixXd inverse_sum(const SquareRef& data, const SquareRef& prior) {
   Eigen::MatrixXd whole = data + prior;
   const Eigen::VectorXd scale = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   whole.array().colwise() *= scale.array();
@@ -86,8 +86,7 @@ Eigen::MatrixXd inverse_sum(const Eigen::MatrixXd& data, const Eigen::MatrixXd& 
   return whole.selfadjointView<Eigen::Lower>();
 }
 
-Eigen::MatrixXd inflated(const Eigen::MatrixXd& inverse, const Eigen::MatrixXd& prior,
-                         double inflation) {
+Eigen::MatrixXd inflated(const SquareRef& inverse, const SquareRef& prior, double inflation) {
   const Index n = inverse.rows();
   Eigen::MatrixXd pulled = Eigen::MatrixXd::Zero(n, n); // (1 − f) X P
   for (Index c = 0; c < n; ++c)
