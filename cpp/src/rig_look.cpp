@@ -88,7 +88,10 @@ class Near {
         for (std::size_t e = c; e < 3; ++e)
           second[to++] += weighted * d[e];
       }
-      const auto linked = (squared <= gap * gap) & (numbers(i) < self);
+      Numbers numbers;
+      for (std::size_t k = 0; k < kLanes; ++k)
+        numbers[k] = number_[i + k];
+      const auto linked = (squared <= gap * gap) & (numbers < self);
       each_bit(bits_of(linked), [&](std::size_t k) { link(number_[i + k]); });
     }
     Moments m{total(all), total(count), Vec3::Zero(), Vec3::Zero(), Eigen::Matrix3d::Zero()};
@@ -104,12 +107,6 @@ class Near {
 
  private:
   using Numbers = long long __attribute__((vector_size(8 * kLanes)));
-  Numbers numbers(std::size_t i) const {
-    Numbers all;
-    for (std::size_t k = 0; k < kLanes; ++k)
-      all[k] = number_[i + k];
-    return all;
-  }
 
   std::array<std::vector<double>, 3> at_;
   std::vector<double> held_;
