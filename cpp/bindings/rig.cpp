@@ -198,7 +198,7 @@ void bind_rig_itself(py::module_& module) {
            })
       .def("vertex_sd",
            [](const Rig& rig, const Array& R, const Points& t, const Points& s, const VectorXd& b,
-              const Eigen::MatrixXd& covariance, const Eigen::VectorXi& of) {
+              const Eigen::Ref<const Eigen::MatrixXd>& covariance, const Eigen::VectorXi& of) {
              const RigPosture at = posture(R, t, s, b);
              return unlocked<VectorXd>([&] { return rig.vertex_sd(at, covariance, of); });
            });
@@ -216,8 +216,9 @@ void bind_rig(py::module_& module) {
       .def(py::init([](std::shared_ptr<Rig> rig) { return std::make_unique<RigFit>(rig); }))
       .def(
           "set_scan",
-          [](RigFit& fit, const Points& points, const supple::Triangles& triangles,
-             const Points& normals, double voxel, bool thin, double gap) {
+          [](RigFit& fit, const supple::GivenPoints& points,
+             const supple::GivenTriangles& triangles, const supple::GivenPoints& normals,
+             double voxel, bool thin, double gap) {
             supple::ScanSettings settings{voxel, thin};
             settings.gap = gap;
             fit.set_scan(points, triangles, normals, settings);

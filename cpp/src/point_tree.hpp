@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <Eigen/Core>
 #include <limits>
-#include <numeric>
 #include <vector>
 
 #include "supple/closest_point.hpp"
@@ -16,11 +15,19 @@ class PointTree {
  public:
   PointTree() = default;
   /// `points` (n, 3).
-  explicit PointTree(const Points& points) : order_(static_cast<std::size_t>(points.rows())) {
-    std::iota(order_.begin(), order_.end(), 0);
-    if (!order_.empty()) build(points, 0, static_cast<int>(order_.size()));
-    for (const int i : order_)
-      points_.push_back(points.row(i).transpose());
+  explicit PointTree(const Points& points) {
+    std::vector<Entry> entries;
+    entries.reserve(static_cast<std::size_t>(points.rows()));
+    for (Eigen::Index i = 0; i < points.rows(); ++i)
+      entries.push_back({points.row(i).transpose(), static_cast<int>(i)});
+    nodes_.resize(entries.empty() ? 0 : static_cast<std::size_t>(nodes_of(points.rows())));
+#pragma omp parallel if (entries.size() > kTask)
+#pragma omp single
+    if (!entries.empty()) build(entries, 0, static_cast<int>(entries.size()), 0);
+    for (const Entry& entry : entries) {
+      points_.push_back(entry.at);
+      order_.push_back(entry.number);
+    }
   }
 
   /// Numbers of the points as they stand in the tree.
@@ -71,30 +78,42 @@ class PointTree {
     double split = 0.0;
   };
 
-  void build(const Points& points, int begin, int end) {
-    const std::size_t self = nodes_.size();
-    nodes_.push_back({begin, end});
+  struct Entry {
+    Eigen::Vector3d at;
+    int number;
+  };
+  static constexpr std::size_t kTask = 512; ///< points that are worth a thread of their own
+
+  /// Nodes of a tree of so many points.
+  static Eigen::Index nodes_of(Eigen::Index points) {
+    return points <= kLeaf ? 1 : 1 + nodes_of(points / 2) + nodes_of(points - points / 2);
+  }
+
+  /// The tree of a range, from node `self` on: what halves it does not depend on the threads.
+  void build(std::vector<Entry>& entries, int begin, int end, std::size_t self) {
+    Node& node = nodes_[self];
+    node = {begin, end};
     if (end - begin <= kLeaf) return;
     Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
     Eigen::Array3d high = -low;
     for (int k = begin; k < end; ++k) {
-      const Eigen::Array3d p = points.row(order_[static_cast<std::size_t>(k)]).transpose().array();
-      low = low.min(p);
-      high = high.max(p);
+      low = low.min(entries[static_cast<std::size_t>(k)].at.array());
+      high = high.max(entries[static_cast<std::size_t>(k)].at.array());
     }
-    int axis = 0;
-    (high - low).maxCoeff(&axis);
-    const int middle = begin + (end - begin) / 2;
-    std::nth_element(
-        order_.begin() + begin, order_.begin() + middle, order_.begin() + end, [&](int i, int j) {
-          return points(i, axis) != points(j, axis) ? points(i, axis) < points(j, axis) : i < j;
-        });
-    const double split = points(order_[static_cast<std::size_t>(middle)], axis);
-    build(points, begin, middle);
-    nodes_[self].right = static_cast<int>(nodes_.size());
-    nodes_[self].axis = axis;
-    nodes_[self].split = split;
-    build(points, middle, end);
+    (high - low).maxCoeff(&node.axis);
+    const int middle = begin + (end - begin) / 2, axis = node.axis;
+    std::nth_element(entries.begin() + begin, entries.begin() + middle, entries.begin() + end,
+                     [axis](const Entry& a, const Entry& b) {
+                       return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis]
+                                                       : a.number < b.number;
+                     });
+    node.split = entries[static_cast<std::size_t>(middle)].at[axis];
+    const std::size_t right = self + 1 + static_cast<std::size_t>(nodes_of(middle - begin));
+    node.right = static_cast<int>(right);
+#pragma omp task shared(entries) if (static_cast<std::size_t>(end - begin) > kTask)
+    build(entries, begin, middle, self + 1);
+    build(entries, middle, end, right);
+#pragma omp taskwait
   }
 
   void visit(int number, const Eigen::Vector3d& q, Nearest& best) const {

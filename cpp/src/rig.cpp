@@ -1,5 +1,7 @@
 #include "supple/rig.hpp"
 
+#include <algorithm>
+#include <array>
 #include <Eigen/Cholesky>
 #include <string>
 
@@ -108,7 +110,8 @@ RowMatrix Rig::jacobian(const RigPosture& posture) const {
   return J;
 }
 
-Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture, const Eigen::MatrixXd& covariance,
+Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture,
+                               const Eigen::Ref<const Eigen::MatrixXd>& covariance,
                                const Eigen::VectorXi& of) const {
   check(posture);
   require_size("covariance's rows", covariance.rows(), unknowns(), "one row an unknown");
@@ -121,21 +124,27 @@ Eigen::VectorXd Rig::vertex_sd(const RigPosture& posture, const Eigen::MatrixXd&
   for (Eigen::Index k = 0; k < of.size(); ++k) {
     const int i = of[k];
     std::vector<int> columns;
-    std::vector<double> values;
-    double trace = 0.0;
+    std::vector<std::array<double, 3>> values; // of the three axes, whose columns are the same
     for (int d = 0; d < 3; ++d) {
-      columns.clear();
-      values.clear();
+      std::size_t to = 0;
       state.add_row(i, Vec3::Unit(d), [&](int column, double value) {
-        columns.push_back(column);
-        values.push_back(value);
+        if (d == 0) {
+          columns.push_back(column);
+          values.emplace_back();
+        }
+        values[to++][static_cast<std::size_t>(d)] = value;
       });
-      for (std::size_t a = 0; a < columns.size(); ++a) {
-        double sum = 0.0;
-        for (std::size_t b = 0; b < columns.size(); ++b)
-          sum += covariance(columns[b], columns[a]) * values[b];
-        trace += sum * values[a];
-      }
+    }
+    double trace = 0.0;
+    for (std::size_t a = 0; a < columns.size(); ++a) {
+      const double* const column = &covariance.coeffRef(0, columns[a]);
+      const auto& x = values[a];
+      std::array<double, 3> sum{};
+      for (std::size_t b = 0; b < a; ++b)
+        for (std::size_t d = 0; d < 3; ++d)
+          sum[d] += column[columns[b]] * values[b][d];
+      for (std::size_t d = 0; d < 3; ++d)
+        trace += x[d] * (2.0 * sum[d] + column[columns[a]] * x[d]);
     }
     sd[k] = std::sqrt(std::max(trace, 0.0) / 3.0);
   }

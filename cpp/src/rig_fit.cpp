@@ -221,8 +221,8 @@ RigFit::RigFit(std::shared_ptr<const Rig> rig) : state_(std::make_unique<State>(
 RigFit::RigFit(RigFit&&) noexcept = default;
 RigFit::~RigFit() = default;
 
-void RigFit::set_scan(const Points& points, const Triangles& triangles, const Points& normals,
-                      const ScanSettings& settings) {
+void RigFit::set_scan(const GivenPoints& points, const GivenTriangles& triangles,
+                      const GivenPoints& normals, const ScanSettings& settings) {
   state_->scan = prepared(points, triangles, normals, settings);
   state_->matcher.set_scan(state_->scan);
 }

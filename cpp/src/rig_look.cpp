@@ -1,7 +1,12 @@
 #include "rig_look.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <Eigen/Eigenvalues>
+#include <numeric>
+
+#include "lane_bits.hpp"
 
 namespace supple {
 namespace {
@@ -24,6 +29,13 @@ double total(const Lanes& lanes) {
 /// The points around the few of a leaf, eight at a time.
 class Near {
  public:
+  /// Room for all points of a tree.
+  explicit Near(const PointTree& tree) : number_(tree.order().size() + kLanes) {
+    for (auto& axis : at_)
+      axis.resize(number_.size());
+    held_.resize(number_.size());
+  }
+
   void gather(const PointTree& tree, const Eigen::VectorXd& held, int first, int last,
               double radius) {
     Vec3 low = tree.at(first), high = low;
@@ -31,13 +43,19 @@ class Near {
       low = low.cwiseMin(tree.at(k));
       high = high.cwiseMax(tree.at(k));
     }
-    clear();
-    tree.near_box(low, high, radius, [&](int k) {
+    std::size_t count = 0;
+    tree.near_box(low, high, radius, [&](int k) { // one that is too far is written over
       const Vec3& p = tree.at(k);
+      for (std::size_t c = 0; c < 3; ++c)
+        at_[c][count] = p[static_cast<Index>(c)];
+      number_[count] = tree.order()[static_cast<std::size_t>(k)];
+      held_[count] = held[number_[count]];
       const double far = (low - p).cwiseMax(p - high).cwiseMax(0.0).squaredNorm();
-      const int number = tree.order()[static_cast<std::size_t>(k)];
-      if (far <= radius * radius) add(p, held[number], number);
+      count += far <= radius * radius ? 1 : 0;
     });
+    lanes_ = (count + kLanes - 1) / kLanes;
+    std::fill(at_[0].begin() + static_cast<std::ptrdiff_t>(count),
+              at_[0].begin() + static_cast<std::ptrdiff_t>(lanes_ * kLanes), 1e9); // far away
   }
 
   /// Moments of those within `radius` of `centre`, about it.
@@ -46,17 +64,20 @@ class Near {
     Vec3 sum, plain; ///< by what they hold, and each alike
     Eigen::Matrix3d second;
   };
-  /// link(number) of those within `gap`.
+  /// link(number) of those within `gap` that are numbered below `self`.
   template <class Link>
-  Moments moments(const Vec3& centre, double radius, double gap, const Link& link) const {
+  Moments moments(const Vec3& centre, double radius, double gap, int self, const Link& link) const {
     Lanes all{}, count{}, sum[3]{}, plain[3]{}, second[6]{};
-    for (std::size_t i = 0; i < held_.size(); ++i) {
-      Lanes d[3];
-      for (std::size_t c = 0; c < 3; ++c)
-        d[c] = at_[c][i] - centre[static_cast<Index>(c)];
+    for (std::size_t i = 0; i < lanes_ * kLanes; i += kLanes) {
+      Lanes d[3], held;
+      for (std::size_t c = 0; c < 3; ++c) {
+        std::memcpy(&d[c], &at_[c][i], sizeof(Lanes));
+        d[c] -= centre[static_cast<Index>(c)];
+      }
+      std::memcpy(&held, &held_[i], sizeof(Lanes));
       const Lanes squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
       const auto within = squared <= radius * radius;
-      const Lanes weight = within ? held_[i] : Lanes{}, one = within ? Lanes{} + 1.0 : Lanes{};
+      const Lanes weight = within ? held : Lanes{}, one = within ? Lanes{} + 1.0 : Lanes{};
       all += weight;
       count += one;
       std::size_t to = 0;
@@ -67,8 +88,11 @@ class Near {
         for (std::size_t e = c; e < 3; ++e)
           second[to++] += weighted * d[e];
       }
+      Numbers numbers;
       for (std::size_t k = 0; k < kLanes; ++k)
-        if (squared[k] <= gap * gap) link(number_[i * kLanes + k]);
+        numbers[k] = number_[i + k];
+      const auto linked = (squared <= gap * gap) & (numbers < self);
+      each_bit(bits_of(linked), [&](std::size_t k) { link(number_[i + k]); });
     }
     Moments m{total(all), total(count), Vec3::Zero(), Vec3::Zero(), Eigen::Matrix3d::Zero()};
     std::size_t from = 0;
@@ -82,28 +106,12 @@ class Near {
   }
 
  private:
-  void clear() {
-    for (auto& axis : at_)
-      axis.clear();
-    held_.clear();
-    number_.clear();
-  }
-  void add(const Vec3& p, double held, int number) {
-    const std::size_t lane = number_.size() % kLanes;
-    if (lane == 0) { // lanes that are left are far away
-      for (auto& axis : at_)
-        axis.push_back(Lanes{} + 1e9);
-      held_.push_back(Lanes{});
-    }
-    for (std::size_t c = 0; c < 3; ++c)
-      at_[c].back()[lane] = p[static_cast<Index>(c)];
-    held_.back()[lane] = held;
-    number_.push_back(number);
-  }
+  using Numbers = long long __attribute__((vector_size(8 * kLanes)));
 
-  std::array<std::vector<Lanes>, 3> at_;
-  std::vector<Lanes> held_;
+  std::array<std::vector<double>, 3> at_;
+  std::vector<double> held_;
   std::vector<int> number_;
+  std::size_t lanes_ = 0;
 };
 
 void describe(const Near::Moments& m, double radius, Index i, Around& found) {
@@ -132,17 +140,15 @@ Around look_around(const Points& points, const Eigen::VectorXd& held, const Poin
                std::vector<std::vector<std::array<int, 2>>>(parts)};
 #pragma omp parallel
   {
-    Near near;
+    Near near(tree);
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < parts; ++part)
       for (std::size_t l = part * kPart; l < std::min(leaves.size(), (part + 1) * kPart); ++l) {
         near.gather(tree, held, leaves[l][0], leaves[l][1], radius);
         for (int k = leaves[l][0]; k < leaves[l][1]; ++k) {
           const int i = tree.order()[static_cast<std::size_t>(k)];
-          const auto link = [&](int j) {
-            if (j < i) found.links[part].push_back({i, j});
-          };
-          describe(near.moments(tree.at(k), radius, gap, link), radius, i, found);
+          const auto link = [&](int j) { found.links[part].push_back({i, j}); };
+          describe(near.moments(tree.at(k), radius, gap, i, link), radius, i, found);
         }
       }
   }

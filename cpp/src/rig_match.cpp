@@ -12,6 +12,8 @@ using Index = Eigen::Index;
 constexpr double kDegree = 0.017453292519943295;
 /// Of so many vertices, one is held against sliding for all.
 constexpr std::size_t kSlide = 4;
+/// Points that follow each other, of which each helps the next to land.
+constexpr std::size_t kRun = 64;
 
 /// Mean of the two normals, so that the residual vanishes for any two points of one sphere: the
 /// curvature of a surface is no residual. Zero where the normals contradict each other.
@@ -101,12 +103,16 @@ std::vector<Landing> Matcher::land_scan(const Points& vertices, double reach) {
 void Matcher::land_each(double reach, std::size_t every) {
   landed_.resize((hint_.size() + every - 1) / every);
   landed_reach_ = reach;
+  const std::size_t runs = (landed_.size() + kRun - 1) / kRun;
 #pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < landed_.size(); ++i) {
-    int& hint = hint_[i * every];
-    landed_[i] =
-        skin_.closest(scan_->points.row(static_cast<Index>(i * every)).transpose(), reach, hint);
-    if (landed_[i].leaf >= 0) hint = landed_[i].leaf;
+  for (std::size_t run = 0; run < runs; ++run) {
+    int near = -1; // where the point before landed, which is not far
+    for (std::size_t i = run * kRun; i < std::min(landed_.size(), (run + 1) * kRun); ++i) {
+      int& hint = hint_[i * every];
+      landed_[i] = skin_.closest(scan_->points.row(static_cast<Index>(i * every)).transpose(),
+                                 reach, hint < 0 ? near : hint);
+      if (landed_[i].leaf >= 0) hint = near = landed_[i].leaf;
+    }
   }
 }
 
@@ -120,17 +126,26 @@ void Matcher::from_scan(const Points& vertices, const RigStage& stage, double we
   land_each(stage.reach, static_cast<std::size_t>(every));
   landed_at_.resize(0, 3);
   if (every == 1) landed_at_ = vertices;
-  pairs.rows.reserve(landed_.size() + static_cast<std::size_t>(rig_.vertices()));
-  for (std::size_t i = 0; i < landed_.size(); ++i)
-    if (landed_[i].triangle >= 0)
-      add_landing(stage, weight * static_cast<double>(every), static_cast<Index>(i) * every,
-                  landed_[i], pairs);
+  const Index count = static_cast<Index>(landed_.size());
+  std::vector<Row> rows(landed_.size());
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < count; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (landed_[k].triangle >= 0)
+      rows[k] = row_at(stage, weight * static_cast<double>(every), i * every, landed_[k]);
+  }
+  pairs.rows.reserve(rows.size() + static_cast<std::size_t>(rig_.vertices()));
+  for (Index i = 0; i < count; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (landed_[k].triangle >= 0 && !rows[k].direction.isZero(0.0))
+      add_landing(i * every, landed_[k], rows[k], pairs);
+  }
 }
 
-/// A row, unless the point lands at the template's border or sees its other side.
-void Matcher::add_landing(const RigStage& stage, double weight, Index p, const Landing& at,
-                          Pairs& pairs) {
+/// Its direction is 0 if the point lands at the template's border or sees its other side.
+Row Matcher::row_at(const RigStage& stage, double weight, Index p, const Landing& at) const {
   Row row;
+  row.direction.setZero();
   Vec3 skin = Vec3::Zero();
   bool inside = at.barycentric.minCoeff() > 0.0;
   for (int c = 0; c < 3; ++c) {
@@ -141,18 +156,21 @@ void Matcher::add_landing(const RigStage& stage, double weight, Index p, const L
     skin += at.barycentric[c] * normals_.row(v).transpose();
     inside = inside || !rig_.at_border(v);
   }
-  if (!inside) return;
+  if (!inside) return row;
   row.direction = direction_of(skin.normalized(), scan_->normals.row(p).transpose(),
                                scan_->oriented, std::cos(stage.angle * kDegree));
-  if (row.direction.isZero(0.0)) return;
   row.target = scan_->points.row(p).transpose();
   row.weight = weight * scan_->area[p];
   row.loss = stage.loss;
+  return row;
+}
+
+void Matcher::add_landing(Index p, const Landing& at, const Row& row, Pairs& pairs) const {
   pairs.triangle[p] = at.triangle;
   pairs.barycentric.row(p) = at.barycentric.transpose();
   pairs.distance[p] = std::sqrt(at.squared);
   pairs.area += scan_->area[p];
-  if (!(weight > 0.0)) return;
+  if (!(row.weight > 0.0)) return;
   pairs.row_of[static_cast<std::size_t>(p)] = static_cast<int>(pairs.rows.size());
   pairs.rows.push_back(row);
 }

@@ -38,8 +38,8 @@ class Matcher {
  private:
   void from_scan(const Points& vertices, const RigStage& stage, double weight, Pairs& pairs);
   void land_each(double reach, std::size_t every);
-  void add_landing(const RigStage& stage, double weight, Eigen::Index p, const Landing& at,
-                   Pairs& pairs);
+  Row row_at(const RigStage& stage, double weight, Eigen::Index p, const Landing& at) const;
+  void add_landing(Eigen::Index p, const Landing& at, const Row& row, Pairs& pairs) const;
   void from_template(const SkinState& state, const RigStage& stage, double weight, Pairs& pairs);
   void turn_normals(const Points& points);
 

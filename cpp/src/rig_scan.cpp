@@ -1,9 +1,11 @@
 #include "rig_scan.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <Eigen/Geometry>
-#include <optional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,12 +18,49 @@ namespace {
 using Vec3 = Eigen::Vector3d;
 using Index = Eigen::Index;
 
+/// The box around points, m.
+struct Extent {
+  Vec3 low, high;
+  double most() const { return (high - low).maxCoeff(); }
+};
+
 /// The voxels that points lie in, numbered as they are met.
 class Voxels {
  public:
-  Voxels(const Points& points, double size) : of_(static_cast<std::size_t>(points.rows())) {
-    const Vec3 low = points.colwise().minCoeff().transpose();
+  Voxels(const GivenPoints& points, const Extent& extent, double size)
+      : of_(static_cast<std::size_t>(points.rows())) {
+    const Vec3 low = extent.low;
     const double per_size = 1.0 / size;
+    const auto across = ((extent.high - low) * per_size).cast<std::uint64_t>().eval();
+    const std::uint64_t x = across[0] + 1, y = across[1] + 1, z = across[2] + 1;
+    if (x * y > kCells || x * y * z > kCells) {
+      find(points, low, per_size);
+      return;
+    }
+    const Index count = points.rows(); // few enough for a table of all
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < count; ++i) {
+      const double* const p = points.data() + 3 * i;
+      const auto along = [&](int d) { return static_cast<int>((p[d] - low[d]) * per_size); };
+      of_[static_cast<std::size_t>(i)] =
+          along(0) + static_cast<int>(x) * (along(1) + static_cast<int>(y) * along(2));
+    }
+    std::vector<int> numbers(x * y * z, -1);
+    for (int& cell : of_) {
+      int& number = numbers[static_cast<std::size_t>(cell)];
+      if (number < 0) number = count_++;
+      cell = number;
+    }
+  }
+  int of(Index point) const { return of_[static_cast<std::size_t>(point)]; }
+  int count() const { return count_; }
+
+ private:
+  static constexpr std::uint64_t kFree = ~std::uint64_t{0}, kCells = 1 << 20;
+
+  void find(const GivenPoints& points, const Vec3& low, double per_size) {
+    keys_.assign(1 << 14, kFree);
+    numbers_.resize(1 << 14);
     std::uint64_t last = kFree;
     for (std::size_t i = 0; i < of_.size(); ++i) {
       const Vec3 cell = (points.row(static_cast<Index>(i)).transpose() - low) * per_size;
@@ -32,12 +71,6 @@ class Voxels {
       last = key;
     }
   }
-  int of(Index point) const { return of_[static_cast<std::size_t>(point)]; }
-  int count() const { return count_; }
-
- private:
-  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
-
   /// Where `key` is, or where it may be put.
   std::size_t slot_of(std::uint64_t key) const {
     std::size_t slot = (key * 0x9E3779B97F4A7C15ull >> 20) & (keys_.size() - 1);
@@ -70,40 +103,59 @@ class Voxels {
 
   std::vector<int> of_;
   /// A table that stays small enough for the cache: a scan has ten points a voxel.
-  std::vector<std::uint64_t> keys_ = std::vector<std::uint64_t>(1 << 14, kFree);
-  std::vector<int> numbers_ = std::vector<int>(1 << 14);
+  std::vector<std::uint64_t> keys_;
+  std::vector<int> numbers_;
   int count_ = 0;
 };
 
-/// Normals (m, 3) weighted by area, not of unit length, from the triangles.
-Points triangle_normals(const Points& points, const Triangles& triangles) {
-  Points normals = Points::Zero(points.rows(), 3);
-  for (Index t = 0; t < triangles.rows(); ++t) {
-    const Vec3 a = points.row(triangles(t, 0)).transpose();
-    const Vec3 b = points.row(triangles(t, 1)).transpose();
-    const Vec3 c = points.row(triangles(t, 2)).transpose();
-    const Vec3 area = (b - a).cross(c - a);
-    for (int k = 0; k < 3; ++k)
-      normals.row(triangles(t, k)) += area.transpose();
+/// Adds up by voxels over points or triangles, in a fixed number of parts, so that the threads'
+/// number leaves no trace: add(i, into (v, columns)).
+template <class Add>
+RowMatrix sums_of(Index count, Index voxels, Index columns, const Add& add) {
+  constexpr Index parts = 4;
+  std::array<RowMatrix, parts> sums;
+#pragma omp parallel for schedule(static, 1)
+  for (Index s = 0; s < parts; ++s) {
+    RowMatrix& sum = sums[static_cast<std::size_t>(s)];
+    sum.setZero(voxels, columns);
+    for (Index i = s * count / parts; i < (s + 1) * count / parts; ++i)
+      add(i, sum);
   }
-  return normals;
+  for (std::size_t s = 1; s < parts; ++s)
+    sums[0] += sums[s];
+  return sums[0];
+}
+
+/// Normals (v, 3) weighted by area, not of unit length, from the triangles: of each voxel, those
+/// of its points, added up. `of` (point): its voxel.
+template <class Of>
+Points triangle_normals(const GivenPoints& points, const GivenTriangles& triangles, Index voxels,
+                        const Of& of) {
+  return sums_of(triangles.rows(), voxels, 3, [&](Index t, RowMatrix& sum) {
+    const auto at = [&](int c) -> Vec3 { return points.row(triangles(t, c)).transpose(); };
+    const Vec3 a = at(0), area = (at(1) - a).cross(at(2) - a);
+    for (int c = 0; c < 3; ++c)
+      for (int d = 0; d < 3; ++d)
+        sum(of(triangles(t, c)), d) += area[d];
+  });
 }
 
 /// One point a voxel: means of points and normals, and how many points each `held`.
-ScanCloud merged(const Points& points, const Points& normals, const Voxels& voxels,
+ScanCloud merged(const GivenPoints& points, const GivenPoints& normals, const Voxels& voxels,
                  Eigen::VectorXd& held) {
   const int count = voxels.count();
+  const RowMatrix sums = sums_of(points.rows(), count, 4, [&](Index i, RowMatrix& sum) {
+    double* const to = &sum(voxels.of(i), 0);
+    for (int d = 0; d < 3; ++d)
+      to[d] += points(i, d);
+    to[3] += 1.0;
+  });
+  held = sums.col(3);
   ScanCloud cloud;
-  cloud.points = Points::Zero(count, 3);
+  cloud.points = sums.leftCols<3>().array().colwise() / held.array();
   cloud.normals = Points::Zero(count, 3);
-  held.setZero(count);
-  for (Index i = 0; i < points.rows(); ++i) {
-    const int v = voxels.of(i);
-    cloud.points.row(v) += points.row(i);
-    if (normals.rows() > 0) cloud.normals.row(v) += normals.row(i);
-    held[v] += 1.0;
-  }
-  cloud.points.array().colwise() /= held.array();
+  for (Index i = 0; i < normals.rows(); ++i)
+    cloud.normals.row(voxels.of(i)) += normals.row(i);
   return cloud;
 }
 
@@ -140,7 +192,38 @@ ScanCloud ordered(const ScanCloud& cloud, const std::vector<int>& order,
   return result;
 }
 
-void check(const Points& points, const Triangles& triangles, const Points& normals, double size) {
+/// Of all coordinates, eight points at a time; not finite if one of them is not.
+Extent extent_of(const GivenPoints& points) {
+  constexpr Index lanes = 24;
+  const Index all = 3 * points.rows(), whole = all / lanes * lanes;
+  const double* const x = points.data();
+  std::array<double, lanes> low, high, wrong{};
+  low.fill(std::numeric_limits<double>::infinity());
+  high.fill(-std::numeric_limits<double>::infinity());
+  const auto take = [&](Index i, Index count) {
+    for (Index k = 0; k < count; ++k) {
+      const std::size_t s = static_cast<std::size_t>(k);
+      const double value = x[i + k];
+      low[s] = value < low[s] ? value : low[s];
+      high[s] = value > high[s] ? value : high[s];
+      wrong[s] += 0.0 * value; // NaN from then on
+    }
+  };
+  for (Index i = 0; i < whole; i += lanes)
+    take(i, lanes);
+  take(whole, all - whole);
+  Extent found{Vec3(low[0], low[1], low[2]), Vec3(high[0], high[1], high[2])};
+  for (std::size_t s = 0; s < lanes; ++s) {
+    const Index d = static_cast<Index>(s) % 3;
+    found.low[d] = std::min(found.low[d], low[s]);
+    found.high[d] = std::max(found.high[d], high[s]);
+    if (!(wrong[s] == wrong[s])) found.low.setConstant(-std::numeric_limits<double>::infinity());
+  }
+  return found;
+}
+
+Extent checked(const GivenPoints& points, const GivenTriangles& triangles,
+               const GivenPoints& normals, double size) {
   if (points.rows() == 0)
     throw ShapeError("points must have a row at least, got none; give a scan");
   if (normals.rows() > 0)
@@ -148,39 +231,37 @@ void check(const Points& points, const Triangles& triangles, const Points& norma
   if (triangles.size() > 0 && (triangles.minCoeff() < 0 || triangles.maxCoeff() >= points.rows()))
     throw ShapeError("triangles must name points from 0 to " + std::to_string(points.rows() - 1) +
                      "; renumber the triangles");
-  if (!points.allFinite() || !normals.allFinite())
+  const Extent extent = extent_of(points);
+  if (!std::isfinite(extent.most()) || !normals.allFinite())
     throw NumericalError("a scan must be finite, got NaN or infinity; repair it");
-  const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
-  if (!(size > 0.0) || extent / size > 2e6)
+  if (!(size > 0.0) || extent.most() / size > 2e6)
     throw NumericalError(
         "voxel must be above 0 m and above a millionth of the scan's extent, got " +
         std::to_string(size) + "; take 0.01");
+  return extent;
 }
 
 } // namespace
 
-ScanCloud prepared(const Points& points, const Triangles& triangles, const Points& normals,
-                   const ScanSettings& settings) {
-  check(points, triangles, normals, settings.voxel);
+ScanCloud prepared(const GivenPoints& points, const GivenTriangles& triangles,
+                   const GivenPoints& normals, const ScanSettings& settings) {
+  const Extent extent = checked(points, triangles, normals, settings.voxel);
   const bool meshed = triangles.rows() > 0, given = normals.rows() > 0;
-  std::optional<Voxels> voxels;
-  Points found;
-#pragma omp parallel sections
-  {
-#pragma omp section
-    if (settings.thin) voxels.emplace(points, settings.voxel);
-#pragma omp section
-    if (!given && meshed) found = triangle_normals(points, triangles);
-  }
-  const Points& sides = given ? normals : found;
   ScanCloud cloud;
   Eigen::VectorXd held;
   if (settings.thin) {
-    cloud = merged(points, sides, *voxels, held);
+    const Voxels voxels(points, extent, settings.voxel);
+    cloud = merged(points, normals, voxels, held);
+    if (!given && meshed)
+      cloud.normals = triangle_normals(points, triangles, voxels.count(),
+                                       [&](Index point) { return voxels.of(point); });
   } else {
     held.setOnes(points.rows());
     cloud.points = points;
-    cloud.normals = sides.rows() > 0 ? sides : Points::Zero(points.rows(), 3);
+    cloud.normals = given    ? Points(normals)
+                    : meshed ? triangle_normals(points, triangles, points.rows(),
+                                                [](Index point) { return point; })
+                             : Points::Zero(points.rows(), 3).eval();
   }
   cloud.oriented = given || meshed;
   const PointTree tree(cloud.points);

@@ -10,7 +10,7 @@ namespace supple {
 /// Normals are `normals`, else the direction in which the neighbours spread least, which noise
 /// disturbs less than the triangles' own; those tell its sign, which stays open without them. A
 /// point stands for its share of the disc around it, so the density of the scan does not count.
-ScanCloud prepared(const Points& points, const Triangles& triangles, const Points& normals,
-                   const ScanSettings& settings);
+ScanCloud prepared(const GivenPoints& points, const GivenTriangles& triangles,
+                   const GivenPoints& normals, const ScanSettings& settings);
 
 } // namespace supple

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "lane_bits.hpp"
+
 namespace supple {
 namespace {
 
@@ -127,30 +129,35 @@ void SkinTree::fill(const Points& points, Leaf& leaf) const {
   }
 }
 
-void SkinTree::refit(const Points& points) {
-  for (std::size_t n = nodes_.size(); n-- > 0;) { // children stand behind their parents
-    Node& node = nodes_[n];
-    Box& box = node.box;
-    if (node.leaf < 0) {
-      const Box& one = nodes_[n + 1].box;
-      const Box& other = nodes_[static_cast<std::size_t>(node.right)].box;
-      for (int d = 0; d < 3; ++d) {
-        box.low[d] = std::min(one.low[d], other.low[d]);
-        box.high[d] = std::max(one.high[d], other.high[d]);
+/// A leaf and the box around its triangles.
+void SkinTree::refit_leaf(const Points& points, Node& node) {
+  Leaf& leaf = leaves_[static_cast<std::size_t>(node.leaf)];
+  Box& box = node.box;
+  fill(points, leaf);
+  for (int d = 0; d < 3; ++d) {
+    box.low[d] = std::numeric_limits<double>::infinity();
+    box.high[d] = -box.low[d];
+    for (int k = 0; k < kLanes; ++k)
+      for (int c = 0; c < 3; ++c) {
+        const double x = points(triangles_(leaf.triangle[k], c), d);
+        box.low[d] = std::min(box.low[d], x);
+        box.high[d] = std::max(box.high[d], x);
       }
-      continue;
-    }
-    Leaf& leaf = leaves_[static_cast<std::size_t>(node.leaf)];
-    fill(points, leaf);
+  }
+}
+
+void SkinTree::refit(const Points& points) {
+#pragma omp parallel for schedule(static)
+  for (std::size_t n = 0; n < nodes_.size(); ++n)
+    if (nodes_[n].leaf >= 0) refit_leaf(points, nodes_[n]);
+  for (std::size_t n = nodes_.size(); n-- > 0;) { // children stand behind their parents
+    if (nodes_[n].leaf >= 0) continue;
+    Box& box = nodes_[n].box;
+    const Box& one = nodes_[n + 1].box;
+    const Box& other = nodes_[static_cast<std::size_t>(nodes_[n].right)].box;
     for (int d = 0; d < 3; ++d) {
-      box.low[d] = std::numeric_limits<double>::infinity();
-      box.high[d] = -box.low[d];
-      for (int k = 0; k < kLanes; ++k)
-        for (int c = 0; c < 3; ++c) {
-          const double x = points(triangles_(leaf.triangle[k], c), d);
-          box.low[d] = std::min(box.low[d], x);
-          box.high[d] = std::max(box.high[d], x);
-        }
+      box.low[d] = std::min(one.low[d], other.low[d]);
+      box.high[d] = std::max(one.high[d], other.high[d]);
     }
   }
   for (Wide& wide : wide_)
@@ -189,13 +196,12 @@ Landing SkinTree::closest(const Vec3& q, double reach, int hint) const {
     Lanes squared;
     wide.measure(q, squared);
     const std::size_t from = top;
-    for (int k = 0; k < kLanes; ++k) {
-      if (!(squared[k] < best.squared)) continue;
+    each_bit(bits_of(squared < best.squared), [&](std::size_t k) {
       std::size_t at = top++; // the nearest on top
       for (; at > from && stack[at - 1].squared < squared[k]; --at)
         stack[at] = stack[at - 1];
       stack[at] = {squared[k], wide.child[k]};
-    }
+    });
   }
   return best;
 }
@@ -231,14 +237,14 @@ void SkinTree::visit(const Vec3& q, int number, Landing& best) const {
     const Lanes gap = aq[d] - v * leaf.ab[d] - w * leaf.ac[d];
     squared += gap * gap;
   }
-  for (int k = 0; k < kLanes; ++k) {
-    if (!(squared[k] < best.squared || (squared[k] == best.squared && best.triangle < 0))) continue;
+  each_bit(bits_of(squared <= best.squared), [&](std::size_t k) {
+    if (!(squared[k] < best.squared || (squared[k] == best.squared && best.triangle < 0))) return;
     best.triangle = leaf.triangle[k];
     best.squared = squared[k];
     best.leaf = number;
     const bool opposite = !inside[k] && !along_b[k] && !along_c[k];
     best.barycentric = Vec3(opposite ? 0.0 : 1.0 - v[k] - w[k], v[k], w[k]);
-  }
+  });
 }
 
 } // namespace supple

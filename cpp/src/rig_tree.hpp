@@ -57,6 +57,7 @@ class SkinTree {
 
   void build(const Points& points, int begin, int end);
   int widen(int node);
+  void refit_leaf(const Points& points, Node& node);
   void fill(const Points& points, Leaf& leaf) const;
   void fill(Wide& wide) const;
   void visit(const Eigen::Vector3d& q, int leaf, Landing& best) const;

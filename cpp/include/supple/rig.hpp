@@ -92,7 +92,8 @@ class Rig {
   RowMatrix jacobian(const RigPosture& posture) const;
   /// (v) sd of each of the vertices `of` (v), √ of the trace of its covariance / 3, for the
   /// covariance of the unknowns `covariance` (9K + A, 9K + A).
-  Eigen::VectorXd vertex_sd(const RigPosture& posture, const Eigen::MatrixXd& covariance,
+  Eigen::VectorXd vertex_sd(const RigPosture& posture,
+                            const Eigen::Ref<const Eigen::MatrixXd>& covariance,
                             const Eigen::VectorXi& of) const;
 
  private:

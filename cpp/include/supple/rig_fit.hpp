@@ -6,6 +6,7 @@
 /// default. Source: Mazier (2022), eqs. 26–31.
 #pragma once
 
+#include <cstdint>
 #include <Eigen/Core>
 #include <memory>
 #include <vector>
@@ -65,6 +66,12 @@ struct RigLandmarks {
   Points target;            ///< (l, 3) m
   Eigen::VectorXd sd;       ///< (l) m
 };
+
+/// A scan as it comes, which is large: read where it is.
+using Dense = Eigen::Stride<0, 0>;
+using GivenPoints = Eigen::Ref<const Points, 0, Dense>;
+using GivenTriangles =
+    Eigen::Ref<const Eigen::Matrix<std::int64_t, Eigen::Dynamic, 3, Eigen::RowMajor>, 0, Dense>;
 
 struct ScanSettings {
   double voxel = 12e-3; ///< m: points within a voxel become one, their mean
@@ -158,8 +165,8 @@ class RigFit {
 
   /// `points` (m, 3) m; `triangles` (t, 3) or none; `normals` (m, 3) outward or none.
   /// @throws ShapeError, NumericalError for arrays that do not fit or are not finite.
-  void set_scan(const Points& points, const Triangles& triangles, const Points& normals,
-                const ScanSettings& settings);
+  void set_scan(const GivenPoints& points, const GivenTriangles& triangles,
+                const GivenPoints& normals, const ScanSettings& settings);
   const ScanCloud& scan() const;
 
   /// Where `points` (m, 3) m land on the skin of a posture, however far.

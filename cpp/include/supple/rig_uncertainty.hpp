@@ -19,12 +19,14 @@ struct ResidualRings {
 ResidualRings residual_rings(const Points& points, const Eigen::VectorXd& residuals,
                              const Eigen::VectorXi& anchors, double width, int rings);
 
+/// A matrix of all unknowns, which is large: read where it is.
+using SquareRef = Eigen::Ref<const Eigen::MatrixXd>;
+
 /// (D + P)⁻¹, its unknowns scaled to a unit diagonal first; 0 × 0 where it is not positive
 /// definite.
-Eigen::MatrixXd inverse_sum(const Eigen::MatrixXd& data, const Eigen::MatrixXd& prior);
+Eigen::MatrixXd inverse_sum(const SquareRef& data, const SquareRef& prior);
 
 /// f X + (1 − f) X P X, X = (D + P)⁻¹: the covariance X (f D + P) X. P may be sparse.
-Eigen::MatrixXd inflated(const Eigen::MatrixXd& inverse, const Eigen::MatrixXd& prior,
-                         double inflation);
+Eigen::MatrixXd inflated(const SquareRef& inverse, const SquareRef& prior, double inflation);
 
 } // namespace supple

@@ -8,7 +8,7 @@
 5. fine       all shapes, the robust threshold shrinking to the noise; arms that went elsewhere are
               set again, and landmarks that slid along the skin are pulled to where the body's own
               shape tells them to be
-6. offset     what bones and shapes cannot reach, smoothly
+6. offset     what bones and shapes cannot reach, smoothly; beside it, how sure they are
 7. slide      along itself, the skin to landmarks that were given, for what is left
 8. judge      is the fit to be trusted, and if not, why
 """
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -113,13 +114,16 @@ def _stages(
     quick = keep if tried else replace(keep, told=0, arms=())
     fit = _fine(rig, scan, first, stages, marks, sds, quick)
     clock.stage("offset")
-    moved = _offset(rig, fit, keep)
+    with ThreadPoolExecutor(1) as aside:  # each is the work of one processor
+        moving = aside.submit(_offset, rig, fit, keep)
+        covariance = uncertainty.of_fit(fit, template)
+        moved = moving.result()
     clock.stage("slide")
     points = fit.points + moved.vectors
-    along = slide(template, fit.posture, points, moved.vectors, named, keep.landmark_sd)
+    points += slide(template, fit.posture, points, moved.vectors, named, keep.landmark_sd)
     clock.stage("judge")
     held = set(template.landmarks) <= set(named)
-    return _result(rig, scan, fit, moved, along, rivals, held, keep, clock)
+    return _result(rig, scan, fit, moved, points, covariance, rivals, held, keep, clock)
 
 
 _RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
@@ -278,18 +282,16 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
 
 
 def _result(
-    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, along: Floats, rivals: list[Rival],
-    held: bool, keep: RegisterSettings, clock: _Clock,
+    rig: Rig, scan: Surface, fit: RigFit, moved: Offset, points: Floats, covariance: Floats,
+    rivals: list[Rival], held: bool, keep: RegisterSettings, clock: _Clock,
 ) -> Registration:  # fmt: skip
-    covariance = uncertainty.of_fit(fit, rig.template)
-    points = fit.points + moved.vectors + along
     off = astray(scan, rig.template, fit.posture, points, keep.doubts.sure) if rivals else 0.0
     warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off, held)
     history = [
         value for one in [*(rival.fit for rival in rivals[:1]), fit] for value in one.history
     ]
     return Registration(
-        rig.template, fit.posture, points, scan, moved.vectors + along,
+        rig.template, fit.posture, points, scan, points - fit.points,
         moved.precision, covariance, not warnings, warnings, clock.stop(), len(history), history,
         _reach(fit), fit,
     )  # fmt: skip

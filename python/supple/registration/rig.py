@@ -149,7 +149,7 @@ class Rig:
                 4 % of them are left out; 0: all stay.
         """
         given = np.empty((0, 3)) if normals is None else np.asarray(normals, dtype=np.float64)
-        self._fit.set_scan(scan.points, scan.triangles.astype(np.int32), given, voxel, thin, gap)
+        self._fit.set_scan(scan.points, scan.triangles, given, voxel, thin, gap)
 
     @property
     def cloud(self) -> Any:

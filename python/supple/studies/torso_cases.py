@@ -30,6 +30,8 @@ NOISE = (1e-3, 2e-3, 3e-3)
 _PRESSED = 0.012
 #: rad and m between frames of a moving scan: of each bone, and of the whole.
 _BONE, _TURN, _SHIFT = 0.01, 0.02, 5e-3
+#: s until the BLAS' threads that made a scan no longer wait, busy, for more of the same.
+_ASLEEP = 0.1
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,7 @@ def _timed(
     """A registration, and its seconds of wall and processor."""
     from ..registration.register import register
 
+    time.sleep(_ASLEEP)
     wall, cpu = time.perf_counter(), time.process_time()
     found = register(scan.surface, template, **given)
     return found, time.perf_counter() - wall, time.process_time() - cpu
