@@ -129,8 +129,8 @@ def evidence(
         return Evidence([], np.empty((0, 3)), [])
     corners, shares = _landing(template, skin, np.array([one[0] for one in wanted.values()]))
     places = np.einsum("kc,kcd->kd", shares, points[corners])
-    near = grown(template, grown(template, seen))
-    names = [name for name, on in zip(wanted, near[corners].any(axis=1), strict=True)
+    near = np.asarray(grown(template, grown(template, seen))[corners].any(axis=1))
+    names = [name for name, on in zip(wanted, near, strict=True)
              if on or not wanted[name][2]]  # fmt: skip
     number = {name: i for i, name in enumerate(wanted)}
     return Evidence(
@@ -147,7 +147,7 @@ def _landing(template: Template, skin: Floats, places: Floats) -> tuple[Ints, Fl
     around = (apart < np.maximum(_PATCH**2, 4 * apart.min(axis=0))).any(axis=1)
     part = template.triangles[around[template.triangles].any(axis=1)]
     hit = Surface(skin, part).closest(places)
-    return part[hit.triangle], np.asarray(hit.barycentric)
+    return np.asarray(part[hit.triangle]), np.asarray(hit.barycentric)
 
 
 def _wanted(
