@@ -68,7 +68,7 @@ def propose(
         scan: a surface or a cloud, m.
         frame: R (3, 3) and t (3,) that carry the scan roughly (20°) into LPS, upright; by default
             the scan is so already.
-        nipples_only: the others, which take time, are not asked for.
+        nipples_only: the others are not looked for, which takes less time.
     """
     R0, t0 = (np.eye(3), np.zeros(3)) if frame is None else map(np.asarray, frame)
     points = scan.points[:: max(1, len(scan.points) // _POINTS)] @ R0.T + t0

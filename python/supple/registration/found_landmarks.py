@@ -84,7 +84,7 @@ def _paired(template: Template, posture: Posture, steps: Mapping[str, Floats]) -
 
 
 def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, Proposal]:
-    """Nipples that the scan shows, seen from the front of the body that ``posture`` puts there."""
+    """Nipples that the scan shows, from the front of the body that ``posture`` puts there."""
     from supple.registration.auto_landmarks import propose
 
     names = [bone.name for bone in template.bones]
@@ -92,8 +92,7 @@ def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, P
         return {}
     chest = names.index("chest")
     R, joint = posture.rotations[chest], template.joints[chest]
-    frame = R.T, joint - R.T @ (joint + posture.translations[chest])
-    return propose(scan, frame, nipples_only=True)
+    return propose(scan, (R.T, joint - R.T @ (joint + posture.translations[chest])), True)
 
 
 def astray(

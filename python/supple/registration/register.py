@@ -7,7 +7,7 @@
 4. landmarks  where asked for: nipples found on the scan join those given
 5. fine       all shapes, the robust threshold shrinking to the noise; landmarks that slid along
               the skin are pulled to where the body's own shape tells them to be
-6. offset     what bones and shapes cannot reach, smoothly; beside it, how sure they are
+6. offset     what bones and shapes cannot reach, smoothly
 7. judge      is the fit to be trusted, and if not, why
 """
 
