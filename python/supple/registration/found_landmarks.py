@@ -92,8 +92,7 @@ def proposed(scan: Surface, template: Template, posture: Posture) -> dict[str, P
         return {}
     chest = names.index("chest")
     R, joint = posture.rotations[chest], template.joints[chest]
-    frame = R.T, joint - R.T @ (joint + posture.translations[chest])
-    return propose(scan, frame, nipples_only=True)
+    return propose(scan, (R.T, joint - R.T @ (joint + posture.translations[chest])), True)
 
 
 def astray(
