@@ -171,7 +171,7 @@ def fold_before(line: Floats, apex: Floats) -> Floats:
     """The edge (3,) m of the fold in a sagittal section ``line`` (k, 3) m near the ``apex``."""
     line = line[(line[:, 2] > apex[2] - _NEAR / 4) & (line[:, 1] < apex[1])]
     line = line[np.linalg.norm(line - apex, axis=1) < _NEAR]
-    centre = apex + (0.0, 0.0, _WITHIN)
+    centre = apex + np.array([0.0, 0.0, _WITHIN])
     line = line[np.argsort(np.arctan2(line[:, 2] - centre[2], centre[1] - line[:, 1]))]
     back = line[:, 1] + line[:, 2]
     length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
