@@ -45,7 +45,7 @@ class RegisterSettings:
     warm: tuple[Stage, ...] = WARM
     search: SearchSettings = field(default_factory=SearchSettings)
     voxel: float = 10e-3  #: the scan is thinned to one point a voxel
-    landmark_sd: float = 2.5e-3  #: of landmarks that are given
+    landmark_sd: float = 5e-3  #: of landmarks that are given
     unlike: float = 8e-3  #: noise of a patch for a body unlike any that the template can become
     follows: float = 1.5e-3  #: patches' sd after a loose fit, below which the body is like that
     sure: float | None = None  #: landmarks found with less confidence are not used; None: none are
