@@ -119,7 +119,7 @@ def fitted(
         said, given = [*said, *checked.said], dict(checked.points)
     settings = RegisterSettings()
     fit = work(found.surface, torso, given or None, settings, posture, run.progress)
-    weights = asdict(settings.weights) if hasattr(settings, "weights") else {}
+    weights = asdict(settings.weights)
     return judged(Outcome(fit, found.surface, given, scan.name, said, weights, found.unit))
 
 

@@ -15,7 +15,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -39,6 +38,7 @@ from supple.registration.registration import Registration
 from supple.registration.rig import Priors, Rig, RigFit, Stage
 from supple.registration.rivals import Rival, against, contenders, decided
 from supple.registration.slide import slide
+from supple.registration.stage_clock import StageClock
 from supple.registration.template import Floats, Template
 from supple.registration.trust import doubts, unlike
 from supple.surface import Surface
@@ -89,7 +89,7 @@ def _stages(
     scan: Surface, template: Template, landmarks: Mapping[str, npt.ArrayLike] | None,
     keep: RegisterSettings, start: Posture | None, progress: Callable[[str], None] | None,
 ) -> Registration:  # fmt: skip
-    clock = _Clock(progress)
+    clock = StageClock(progress)
     clock.stage("scan")
     _check(scan)
     named = {name: np.asarray(at, dtype=np.float64) for name, at in (landmarks or {}).items()}
@@ -134,27 +134,6 @@ def rig_of(template: Template) -> Rig:
     if template not in _RIGS:
         _RIGS[template] = Rig(template)
     return _RIGS[template]
-
-
-class _Clock:
-    """Seconds of each stage."""
-
-    def __init__(self, progress: Callable[[str], None] | None) -> None:
-        self.progress, self.name = progress, ""
-        self.begun = self.since = time.perf_counter()
-        self.seconds: dict[str, float] = {}
-
-    def stage(self, name: str) -> None:
-        now = time.perf_counter()
-        if self.name:
-            self.seconds[self.name] = now - self.since
-        self.name, self.since = name, now
-        if self.progress is not None and name:
-            self.progress(name)
-
-    def stop(self) -> dict[str, float]:
-        self.stage("")
-        return self.seconds | {"total": time.perf_counter() - self.begun}
 
 
 def _check(scan: Surface) -> None:
@@ -283,10 +262,11 @@ def _offset(rig: Rig, fit: RigFit, keep: RegisterSettings) -> Offset:
 
 def _result(
     rig: Rig, scan: Surface, fit: RigFit, moved: Offset, points: Floats, covariance: Floats,
-    rivals: list[Rival], held: bool, keep: RegisterSettings, clock: _Clock,
+    rivals: list[Rival], held: bool, keep: RegisterSettings, clock: StageClock,
 ) -> Registration:  # fmt: skip
     off = astray(scan, rig.template, fit.posture, points, keep.doubts.sure) if rivals else 0.0
     warnings = doubts(rig, fit, moved.vectors, rivals, covariance, keep.doubts, off, held)
+    covariance = covariance * uncertainty.slid(0.0 if held else unlike(fit, moved.vectors))
     history = [
         value for one in [*(rival.fit for rival in rivals[:1]), fit] for value in one.history
     ]

@@ -3,8 +3,8 @@
 The fit counts each patch of the scan as one observation with a standard deviation assumed
 beforehand. What its residuals really were, and over what distance neighbours share them, is
 measured afterwards and corrects that: `inflation`. The prior is left as it is, so that skin which
-the scan lacks is as uncertain as bodies differ. A body whose bones are sized unlike the template's
-is fitted by a skin that slid, which no residual tells: `slid`.
+the scan lacks is as uncertain as bodies differ. A body unlike any that the template can become is
+fitted by a skin that slid, which no residual tells: `slid`.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ if TYPE_CHECKING:
 _FAR, _RING = 0.12, 0.01
 #: Points whose residuals are compared, with so many others.
 _ANCHORS, _OTHERS = 200, 4000
-#: Mean square of the bones' sizes, in standard deviations, up to which skin stays where it was; how
-#: much variance each unit beyond adds, and the largest factor. So that the bands of landmarks hold
-#: 9 of 10 on fits of one template to bodies of another (shapes 1000 and 1001, all poses).
-_ALIKE, _SLIDES, _FURTHEST = 0.15, 20.0, 10.0
+#: How far skin leaves what bones and shapes can do, in the scan's noise: below the first the body
+#: is like the template's, above the second not; and what variances are multiplied by there. So
+#: that bands hold 19 of 20 points on fits to bodies of the same and of another template (shapes
+#: 1000 to 1009 and 1020 to 1029, all poses). Random bodies differ less than the prior has it.
+_LIKE, _UNLIKE, _SURE, _SLIDES = 0.22, 0.36, 0.75, 9.0
 #: Robust weight below which a point was left out.
 _USED = 0.05
 
@@ -63,17 +64,16 @@ def of_fit(found: RigFit, template: Template, patch: float = 15e-3) -> Floats:
     spent = len(inverse) - float((inverse * found.prior_matrix).sum())  # tr(H⁻¹ D)
     free = 1 - spent / max(found.observations, 1.0)
     noise = inflation(points, residuals, patch, found.noise, free)
-    spread = slid(2 * found.energy["scale"] / (3 * len(template.bones)))
-    return np.asarray(spread * core().inflated(inverse, found.prior_matrix, noise))
+    return np.asarray(core().inflated(inverse, found.prior_matrix, noise))
 
 
-def slid(sizes: float) -> float:
-    """By what the variance grows where bones are sized unlike those of the template.
+def slid(left: float) -> float:
+    """What the covariance of a fit is to be multiplied by, as its skin may have slid.
 
     Args:
-        sizes: mean square of the bones' scales against their parents', in standard deviations.
+        left: how far skin leaves what bones and shapes can do, in the scan's noise (`unlike`).
     """
-    return min(1 + _SLIDES * max(sizes - _ALIKE, 0.0), _FURTHEST)
+    return float(np.interp(left, (_LIKE, _UNLIKE), (_SURE, _SLIDES)))
 
 
 def covariance(data_matrix: Floats, prior_matrix: Floats, inflation: float = 1.0) -> Floats:
