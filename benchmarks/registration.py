@@ -27,6 +27,7 @@ def main() -> None:
     parser.add_argument("--shapes", type=int, default=100, help="random bodies a pose and pair")
     parser.add_argument("--data", type=Path, help="folder of template_makehuman")
     parser.add_argument("--pairs", nargs="*", help="of those only, as scanned-fitted")
+    parser.add_argument("--warm", type=int, default=1000, help="shapes whose next frame counts too")
     parser.add_argument("--peer", type=int, default=0, help="shapes that the peer gets too")
     parser.add_argument("--table", action="store_true", help="only write the table again")
     given = parser.parse_args()
@@ -49,7 +50,8 @@ def _run(given: Any, kept: Path) -> None:
         if given.pairs and f"{case.scanned}-{case.fitted}" not in given.pairs:
             continue
         if case.key not in done:
-            _keep(kept, _row(torso_cases.run(case, known, warm=case.noise > 0)))
+            warm = case.noise > 0 and case.shape < given.warm
+            _keep(kept, _row(torso_cases.run(case, known, warm)))
         if case.shape < given.peer and case.noise > 0 and f"peer {case.key}" not in done:
             _keep(kept, registration_peer.row(case, known))
 

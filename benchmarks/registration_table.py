@@ -70,15 +70,20 @@ def _seconds(rows: Sequence[Row]) -> list[str]:
     noisy = [row for row in rows if row["noise_mm"] > 0]
     for pair, own in [*_groups(noisy, lambda r: r["pair"]), ("all", noisy)]:
         cells = [
-            f"{f([row[name] for row in own]):.3f}"
+            f"{f(some):.3f}" if (some := _finite(own, name)) else "–"
             for name, f in (("seconds", np.median), ("seconds", _late), ("cpu", np.median),
                             ("warm_seconds", np.median), ("warm_seconds", _late),
                             ("warm_cpu", np.median))
         ]  # fmt: skip
-        warm = f"{np.mean([row['warm_surface'] for row in own]):.2f}"
+        warm = f"{np.mean(some):.2f}" if (some := _finite(own, "warm_surface")) else "–"
         failed = sum(bool(row["warm_failed"]) for row in own)
         table.append((pair, len(own), *cells, warm, failed))
     return output.markdown(head, table) if noisy else ["none with noise"]
+
+
+def _finite(rows: Sequence[Row], name: str) -> list[float]:
+    """Of the rows that have it: not all have a next frame."""
+    return [row[name] for row in rows if np.isfinite(row[name])]
 
 
 def _late(values: Sequence[float]) -> float:
