@@ -108,12 +108,12 @@ def test_a_landmark_slid_along_the_skin_is_named_with_its_distance(wrong: str) -
     marks, skin = dict(_scan().truth.landmarks), _scan().surface.points
     away = np.linalg.norm(skin - marks[wrong], axis=1)
     marks[wrong] = skin[np.argmin(np.abs(away - 0.06))]
-    found = register(_scan().surface, _template(), marks, start=_fit().posture)
+    found = register(_scan().surface, _template(), marks)
     said = [w for w in found.warnings if w.startswith("Landmark")]
     assert len(said) == 1
     assert said[0].startswith(f"Landmark {wrong} was given ")
     others = {name: at for name, at in marks.items() if name != wrong}
-    without = register(_scan().surface, _template(), others, start=_fit().posture)
+    without = register(_scan().surface, _template(), others)
     there = _template().landmark_points(without.fit.points)[wrong]
     off = np.linalg.norm(marks[wrong] - there)
     assert abs(float(said[0].split()[4]) - 1e3 * off) < 8
