@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from supple.registration.arm_search import lost_arms, settled_arms
 from supple.registration.pose_presets import PRESETS, Preset, preset_posture
@@ -50,7 +52,7 @@ def test_arms_of_bodies_are_not_lost(pose: Any) -> None:
     R = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
     joints = _template().joints
     for posture in [
-        *(random_posture(_template(), pose, seed) for seed in range(10)),
+        *(random_posture(_template(), pose, seed) for seed in range(1000, 1010)),
         *(preset_posture(_template(), preset) for preset in PRESETS),
     ]:
         assert lost_arms(posture.moved(R, np.ones(3), joints), _template()) == []
@@ -81,6 +83,33 @@ def test_an_arm_that_the_scan_has_there_stays() -> None:
     """If the energy is least with the arm turned away, nothing is changed."""
     odd = _twisted(preset_posture(_template(), PRESETS[0]), "left", 70.0)
     assert settled_arms(_energy_by(odd)(odd), _template(), _energy_by(odd)) is None
+
+
+@pytest.mark.parametrize(
+    ("bone", "lost"), [("arm_right", ["left"]), ("shoulder_right", ["left"]), ("chest", [])]
+)
+def test_an_arm_without_another_like_it_stays(bone: str, lost: list[str]) -> None:
+    """A template with one arm, or one shoulder, tells nothing of a lost arm; without a chest none
+    is lost."""
+    other = replace(_template(), bones=tuple(
+        replace(one, name="other") if one.name == bone else one for one in _template().bones
+    ))  # fmt: skip
+    true = preset_posture(_template(), PRESETS[0])
+    odd = _twisted(true, "left", 70.0)
+    assert lost_arms(odd, other) == lost
+    assert settled_arms(_energy_by(true)(odd), other, _energy_by(true)) is None
+
+
+def test_an_arm_that_points_straight_ahead_is_lost() -> None:
+    """At 90° to the front its direction sideways says nothing, and no rounding is in the way."""
+    rest = Posture.rest(_template())
+    arm = [bone.name for bone in _template().bones].index("arm_left")
+    along = _template().weights[:, arm] @ (_template().points - _template().joints[arm])
+    across = np.cross(along / np.linalg.norm(along), [0.0, -1.0, 0.0])
+    turns = rest.rotations.copy()
+    turns[arm] = Rotation.align_vectors([[0.0, -1, 0], across], [along, across])[0].as_matrix()
+    ahead = Posture(turns, rest.translations, rest.scales, rest.blend)
+    assert "left" in lost_arms(ahead, _template())
 
 
 def test_the_facing_that_explains_the_scan_goes_on() -> None:

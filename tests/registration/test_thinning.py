@@ -56,6 +56,25 @@ def test_a_scan_may_lie_anywhere_in_memory() -> None:
     assert np.array_equal(clouds[0], clouds[2])
 
 
+def test_triangles_and_points_may_be_of_any_kind_of_number() -> None:
+    """Numbers that float32 holds, and triangles of int32, by columns or cut out: the same cloud."""
+    skin = procedural.torso()
+    points, faces = skin.points.astype(np.float32), skin.triangles
+    wide = np.zeros((len(faces), 4), dtype=np.int32)
+    wide[:, :3] = faces
+    rig, clouds = Rig(skin), []
+    for xyz, ids in (
+        (points.astype(np.float64), faces),
+        (points, faces.astype(np.int32)),
+        (np.asfortranarray(points), np.asfortranarray(faces)),
+        (np.repeat(points, 2, axis=0)[::2], wide[:, :3]),
+    ):
+        rig._fit.set_scan(xyz, ids, np.empty((0, 3)), VOXEL, True, 0)
+        clouds.append((rig.cloud.points.copy(), rig.cloud.normals.copy()))
+    for cloud in clouds[1:]:
+        assert all(np.array_equal(a, b) for a, b in zip(cloud, clouds[0], strict=True))
+
+
 @pytest.mark.parametrize("size", [1, 47, 48, 49, 131])
 def test_inverse_and_covariance_are_those_of_linear_algebra(size: int) -> None:
     random = np.random.default_rng(size)

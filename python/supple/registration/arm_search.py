@@ -30,6 +30,8 @@ def settled_arms(
 ) -> Posture | None:
     """The posture of ``fit`` with arms where they explain more; None: they stay.
 
+    A lost arm of a template without another stays: nothing tells where it is.
+
     Args:
         refit: moves the bones from a posture, quickly.
     """
@@ -55,7 +57,7 @@ def lost_arms(posture: Posture, template: Template) -> list[str]:
     number = {bone.name: k for k, bone in enumerate(template.bones)}
     lost = []
     for side in _SIDES:
-        if f"arm_{side}" not in number or "chest" not in number:
+        if not {f"arm_{side}", "chest"} <= number.keys():
             continue
         raised, forward = _direction(posture, template, number[f"arm_{side}"], number["chest"])
         if not _RAISED[0] < raised < _RAISED[1] or abs(forward) > _FORWARD:
@@ -69,17 +71,18 @@ def _direction(posture: Posture, template: Template, arm: int, chest: int) -> tu
     out = np.sign(at_rest[0])
     x, y, z = posture.rotations[chest].T @ posture.rotations[arm] @ at_rest
     return (float(np.degrees(np.arctan2(out * x, -z))),
-            float(np.degrees(np.arcsin(y / np.linalg.norm(at_rest)))))  # fmt: skip
+            float(np.degrees(np.arctan2(y, np.hypot(x, z)))))  # fmt: skip
 
 
 def _trials(posture: Posture, template: Template, side: str, alone: bool) -> list[list[Floats]]:
     """Turns (3, 3) of shoulder and arm against their parents.
 
-    As the other arm's, unless that is lost as well; then those of presets.
+    As the other arm's, if it has the same bones; if that is lost as well, those of presets.
     """
     if alone:
         other = _turns(posture, template, _SIDES[side == "left"])
-        return [[_IMAGE @ turn @ _IMAGE for turn in other]]
+        alike = len(other) == len(_bones(template, side))
+        return [[_IMAGE @ turn @ _IMAGE for turn in other]] if alike else []
     presets = [preset_posture(template, Preset("", degrees)) for degrees in _TRIED]
     return [_turns(preset, template, side) for preset in presets]
 

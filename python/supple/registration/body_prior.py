@@ -67,6 +67,8 @@ def back_seen(rig: Rig, posture: Posture) -> bool:
         return True
     chest = names.index("chest")
     own = np.flatnonzero(template.weights[:, chest] > 0.5)
+    if not len(own):
+        return True
     at = template.points[own] - template.joints[chest]
     middle = own[(np.abs(at[:, 0]) < _MIDDLE) & (at[:, 1] > np.median(at[:, 1]))]
     points, normals = cloud.points[::8], cloud.normals[::8]

@@ -99,7 +99,10 @@ class Outcome:
 
 
 def judged(outcome: Outcome) -> Outcome:
-    """Not to be trusted where hardly any of the drawing lies on the scan: the back was scanned."""
+    """Not to be trusted where hardly any of the drawing lies on the scan: the back was scanned.
+
+    Of a cloud, which is no surface, nothing lies on the scan, and that says nothing.
+    """
     if not len(outcome.scan.triangles):
         return outcome
     share = float(np.concatenate([c.on_scan for c in outcome.curves.values()]).mean())

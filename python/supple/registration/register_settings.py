@@ -40,7 +40,7 @@ class RegisterSettings:
     priors: Priors | None = None  #: how bodies differ; `body_prior` of the template
     coarse: tuple[Stage, ...] = COARSE
     face: tuple[Stage, ...] = FACE
-    arms: tuple[Stage, ...] = ARMS  #: none: arms stay where they went
+    arms: tuple[Stage, ...] = ARMS  #: (): arms stay where they went
     fine: tuple[Stage, ...] = FINE
     warm: tuple[Stage, ...] = WARM
     search: SearchSettings = field(default_factory=SearchSettings)

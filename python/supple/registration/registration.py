@@ -26,7 +26,8 @@ class Registration:
         template, posture: ``posed(template, posture) + offset`` are the points.
         points: (n, 3) m, the registered skin's vertices.
         scan: that was registered.
-        offset: (n, 3) m by which the skin leaves what bones and blendshapes can do.
+        offset: (n, 3) m by which the skin leaves what bones and blendshapes can do, and by which it
+            slid along itself to landmarks that were given.
         offset_precision: (n, n) sparse, 1/m², of its size along the normals; None without it.
         covariance: (9K+A, 9K+A) of the unknowns, in the order of `Posture.stepped`.
         trustworthy: no warning that makes the fit doubtful.

@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from supple.registration.posture import Posture
 from supple.registration.rest_landmarks import at_rest, grown
+from supple.registration.skin import edges, free_edges
 from supple.registration.template import Floats, Template
 from supple.surface import Surface
 
@@ -41,7 +42,7 @@ def slide(
     template: Template, posture: Posture, points: Floats, offset: Floats,
     marks: Mapping[str, Floats], sd: float,
 ) -> Floats:  # fmt: skip
-    """By what the vertices (n, 3) m move along the skin.
+    """By what the vertices (n, 3) m move along the skin; 0 if it cannot but fold.
 
     Args:
         points: (n, 3) m of the skin.
@@ -102,9 +103,8 @@ def _areas(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
 @lru_cache(maxsize=16)
 def _free(template: Template) -> Floats:
     """(n,) how freely vertices move along the skin: 0 at its rim, 1 away from it."""
-    edges = np.sort(template.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    once, times = np.unique(edges, axis=0, return_counts=True)
-    rim = template.points[np.unique(once[times == 1])]
+    faces = template.triangles
+    rim = template.points[np.unique(edges(faces)[free_edges(faces)])]
     if not len(rim):
         return np.ones(len(template.points))
     apart = ((template.points[:, None] - rim) ** 2).sum(axis=2).min(axis=1)

@@ -45,7 +45,7 @@ def doubts(
     """One sentence a reason not to trust ``fit``.
 
     Args:
-        offset: (n, 3) m of the last stage.
+        offset: (n, 3) m by which the skin left what bones and shapes can do.
         rivals: facings that were compared, the chosen one first; none where a start was given.
         astray: m from a nipple of the fit to where the scan shows one.
         held: whether all landmarks were given, so that the skin could not slide.
