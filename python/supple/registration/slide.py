@@ -65,7 +65,8 @@ def slide(
 def _along(template: Template, skin: Floats, moved: Floats, points: Floats) -> Floats:
     """The step (n, 3) m of ``points`` to where ``skin`` moved by ``moved`` returns to itself.
 
-    Vertices of triangles that would turn over, in a crease, move less, and so do those around.
+    Vertices of triangles that would turn over, in a crease at rest or in one of the pose alone,
+    move less, and so do those around.
     """
     home = Surface(skin, template.triangles)
     asked = np.flatnonzero((moved**2).sum(axis=1) > _STILL**2)
@@ -76,6 +77,7 @@ def _along(template: Template, skin: Floats, moved: Floats, points: Floats) -> F
         at_home[asked] = np.einsum("kc,kcd->kd", shares, skin[corners])
         step[asked] = np.einsum("kc,kcd->kd", shares, points[corners]) - points[asked]
         over = _over(template.triangles, skin, at_home)
+        over |= _over(template.triangles, points, points + step)
         if not over.any():
             return step
         asked = np.flatnonzero(grown(template, over))
