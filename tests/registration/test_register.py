@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
 
@@ -49,6 +50,15 @@ def test_a_scan_is_registered_without_landmarks() -> None:
     assert marks < 6.0
     assert _found().surface_mae_mm < 2.5
     assert not _found().used[~_scan().skin].mean() > 0.5
+
+
+def test_threads_may_register_scans_at_the_same_time() -> None:
+    """Two scans and one template: each to the bits that it has alone."""
+    scans = [_scan("standing", seed, points=6_000).surface for seed in (1000, 1001)]
+    alone = [register(scan, _template()).points for scan in scans]
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(lambda scan: register(scan, _template()).points, scans))
+    assert all(np.array_equal(one, other) for one, other in zip(found, alone, strict=True))
 
 
 def test_its_points_are_those_of_its_posture_and_offset() -> None:

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -126,14 +127,22 @@ def _stages(
     return _result(rig, scan, fit, moved, points, covariance, rivals, held, keep, clock)
 
 
-_RIGS: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
+class _Rigs(threading.local):
+    """Those of a thread: a rig holds the scan that it is fitted to."""
+
+    def __init__(self) -> None:
+        self.of: WeakKeyDictionary[Template, Rig] = WeakKeyDictionary()
+
+
+_RIGS = _Rigs()
 
 
 def rig_of(template: Template) -> Rig:
-    """The template in the core, made once."""
-    if template not in _RIGS:
-        _RIGS[template] = Rig(template)
-    return _RIGS[template]
+    """The template in the core, made once a thread."""
+    rigs = _RIGS.of
+    if template not in rigs:
+        rigs[template] = Rig(template)
+    return rigs[template]
 
 
 def _check(scan: Surface) -> None:

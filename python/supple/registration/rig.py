@@ -166,7 +166,7 @@ class Rig:
         landmark_sd: float | Mapping[str, float] = 5e-3,
         report: Report = "whole",
     ) -> RigFit:
-        """Fit to the scan from ``start``; other threads may run meanwhile.
+        """Fit to the scan from ``start``; other threads may run meanwhile, with rigs of their own.
 
         Args:
             landmarks: name → (3,) m on the scan.
