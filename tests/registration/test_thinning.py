@@ -38,6 +38,7 @@ def _means(points: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("far", [0.0, 40.0])
 def test_thinned_points_are_the_means_of_voxels_however_far_a_scan_reaches(far: float) -> None:
+    """Those that NumPy takes over cells of a grid, with voxels in a table and looked up."""
     points = _sheet()
     if far:  # so many voxels that they are looked up, not counted off
         points = np.vstack([points, points[:500] + far])
@@ -45,6 +46,7 @@ def test_thinned_points_are_the_means_of_voxels_however_far_a_scan_reaches(far: 
 
 
 def test_a_scan_may_lie_anywhere_in_memory() -> None:
+    """By rows, by columns and cut out of a wider array: the same cloud to the bit."""
     points = _sheet(5_000)
     rig, wide = Rig(procedural.torso()), np.zeros((len(points), 5))
     wide[:, 1:4] = points
@@ -77,6 +79,7 @@ def test_triangles_and_points_may_be_of_any_kind_of_number() -> None:
 
 @pytest.mark.parametrize("size", [1, 47, 48, 49, 131])
 def test_inverse_and_covariance_are_those_of_linear_algebra(size: int) -> None:
+    """(D + P)⁻¹ = X and X (f D + P) X by LAPACK, at sizes about the blocks' of the core."""
     random = np.random.default_rng(size)
     root = random.normal(size=(size, size))
     data, prior = root @ root.T, np.diag(0.5 + random.random(size))

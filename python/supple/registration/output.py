@@ -26,6 +26,7 @@ from supple.registration.measures import Measures, measures
 from supple.registration.metrics import Metrics, metrics
 from supple.registration.posture import Posture
 from supple.registration.transfer import Carried, Transfer
+from supple.registration.trust import below
 
 if TYPE_CHECKING:
     from supple.registration.registration import Registration
@@ -108,7 +109,7 @@ def judged(outcome: Outcome) -> Outcome:
     share = float(np.concatenate([c.on_scan for c in outcome.curves.values()]).mean())
     if share >= _DRAWN:
         return outcome
-    warning = (f"Only {np.floor(100 * share):.0f}% of the drawing lies on the scan, less than "
+    warning = (f"Only {below(share)} of the drawing lies on the scan, less than "
                f"{_DRAWN:.0%}; scan the front.")  # fmt: skip
     fit = outcome.registration
     doubted = replace(fit, trustworthy=False, warnings=[*fit.warnings, warning])

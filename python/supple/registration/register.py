@@ -222,7 +222,8 @@ def _told(
     """The landmarks given, and those that the fit's own shape puts elsewhere.
 
     Where they slid far, ``fit`` is made again with them, and asked once more. On a body that the
-    template can become nothing slides, and its own rest shape tells more than rules do.
+    template can become nothing slides, and its own rest shape tells more than rules do. Skin leaves
+    such a body by 0.25 to 0.40 of the noise, and another template's by 0.5 to 1: ``keep.like``.
     """
     marks, sds = dict(given), dict(given_sds)
     for left in reversed(range(keep.told)):

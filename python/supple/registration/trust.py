@@ -72,7 +72,7 @@ def doubts(
         f"{1e3 * limits.residual:.0f} mm; check that it shows a bare torso, in metres.": (
             fit.residual_sd > limits.residual
         ),
-        f"Only {np.floor(100 * used):.0f}% of the scan are this body's skin, less than "
+        f"Only {below(used)} of the scan are this body's skin, less than "
         f"{limits.on_skin:.0%}; cut away what is not the torso.": used < limits.on_skin,
         f"The standard deviation of the breasts is {1e3 * sd:.0f} mm, more than "
         f"{1e3 * limits.sd:.0f} mm; scan more of the front, or give landmarks.": sd > limits.sd,
@@ -99,7 +99,7 @@ def doubts(
         ),
     }
     for side, part in share.items():
-        found[f"The scan shows {part:.0%} of the {side} breast, less than {limits.seen:.0%}; "
+        found[f"The scan shows {below(part)} of the {side} breast, less than {limits.seen:.0%}; "
               "scan the front."] = part < limits.seen  # fmt: skip
     return [text for text, holds in found.items() if holds]
 
@@ -117,6 +117,11 @@ def _away(fit: RigFit, offset: Floats) -> float:
     """Root mean square, m, of ``offset`` (n, 3) m where skin is seen."""
     seen = fit.vertex_used > 0.05
     return float(np.sqrt((offset[seen] ** 2).sum(axis=1).mean())) if seen.any() else 0.0
+
+
+def below(share: float) -> str:
+    """Per cent, rounded down: one that is just less than a limit must not read as the limit."""
+    return f"{np.floor(100 * share):.0f}%"
 
 
 def _at_bounds(fit: RigFit, bounds: Floats) -> float:
