@@ -21,12 +21,13 @@ from supple.cli import main
 from supple.registration import register as register_module
 from supple.registration.landmark_files import read_landmarks
 from supple.registration.landmark_writing import write_landmarks
-from supple.registration.output import read_posture
+from supple.registration.output import Outcome, judged, read_posture
 from supple.registration.posture import posed
 from supple.registration.procedural import torso
 from supple.registration.registration import Registration
 from supple.registration.synthetic import SyntheticScan, random_posture, synthetic_scan
 from supple.registration.template import LANDMARKS
+from supple.registration.transfer import Carried
 
 FILES = {
     "registered.ply", "drawing.ply", "drawing.obj", "drawing.glb", "landmarks.mrk.json",
@@ -193,6 +194,20 @@ def test_a_scan_of_the_back_does_not_carry_the_drawing(
     assert re.search(r"Only \d+% of the drawing lies on the scan, less than 25%", printed.err)
     assert re.search(r"note: \d+ points of \d+ are in no triangle: left out", printed.out)
     assert json.loads((tmp_path / "out" / "result.json").read_text())["not_trustworthy"]
+
+
+def test_a_drawing_is_doubted_below_a_quarter_on_a_surface_and_never_on_a_cloud(
+    scan: SyntheticScan, truth: Callable[..., Any]
+) -> None:
+    """Of 100 points, 25 on the scan pass and 24 do not; a cloud has no surface to be on."""
+    fit, cloud = truth(True)(scan.surface, torso()), Surface(scan.surface.points)
+    assert judged(Outcome(fit, cloud)).registration is fit
+    for count in (24, 25):
+        outcome = Outcome(fit, scan.surface)
+        line = Carried(np.zeros((100, 3)), np.arange(100) < count, np.zeros(100))
+        outcome.__dict__["curves"] = {"breast_left": line}
+        found = judged(outcome).registration
+        assert (found.trustworthy, len(found.warnings)) == (count == 25, int(count < 25))
 
 
 @pytest.mark.usefixtures("no_fit")

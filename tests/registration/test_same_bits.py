@@ -18,7 +18,8 @@ template = torso()
 scan = synthetic_scan(template, random_posture(template, "standing", 1000), 3, points=20_000)
 cold = register(scan.surface, template)
 warm = register(scan.surface, template, start=cold.posture)
-whole = b"".join(np.ascontiguousarray(a).tobytes() for one in (cold, warm)
+slid = register(scan.surface, template, landmarks=scan.truth.landmarks)
+whole = b"".join(np.ascontiguousarray(a).tobytes() for one in (cold, warm, slid)
                  for a in (one.points, one.covariance, one.sd, one.offset, one.fit.used))
 print(hashlib.sha256(whole).hexdigest(), cold.warnings, warm.warnings)
 """
@@ -44,7 +45,7 @@ def _said(program: str, core: int, blas: int, *arguments: str) -> str:
 
 @pytest.mark.slow
 def test_a_registration_has_the_same_bits_with_one_thread_and_two() -> None:
-    """Points, covariance, deviations, offset and weights of a cold and a warm fit: one hash."""
+    """Points, covariance, deviations, offset, weights of a fit, a warm one and one to landmarks."""
     assert _said(_REGISTER, 1, 1) == _said(_REGISTER, 2, 2)
 
 
