@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -53,14 +53,29 @@ def _by_trimesh(path: Path, suffix: str) -> tuple[Floats, Ints]:
             loaded: Any = trimesh.load(path, process=False, **keep_ids)
             parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
     except Exception as error:  # trimesh raises what its parsers happen to raise
-        raise MeshError(
-            f"{path} is no surface that can be read ({error}); save it as PLY."
-        ) from None
+        return _polygons(path, suffix, error)
     points, faces = _joined(parts)
     if suffix != ".stl":
         return points, faces
     points, same = np.unique(points, axis=0, return_inverse=True)  # STL repeats each corner
     return points, same.ravel()[faces]
+
+
+def _polygons(path: Path, suffix: str, error: Exception) -> tuple[Floats, Ints]:
+    """Of a PLY with polygons of several sizes, which trimesh takes for a broken one.
+
+    Raises:
+        MeshError: with what trimesh said, of any other file.
+    """
+    from supple.ply_polygons import load_polygons
+
+    if suffix == ".ply":
+        with suppress(ValueError, LookupError):
+            return load_polygons(path)
+    again = " again" if suffix == ".ply" else ""
+    raise MeshError(
+        f"{path} is no surface that can be read ({error}); save it as PLY{again}."
+    ) from None
 
 
 def _joined(parts: Sequence[Any]) -> tuple[Floats, Ints]:

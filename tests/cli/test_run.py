@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
 import signal
 import subprocess
@@ -186,6 +188,48 @@ sys.exit(supple.cli.main(["probe", "--out", sys.argv[1]]))
         assert running.stdout.readline() == "working\n"
         running.send_signal(sent)
         assert running.wait(timeout=20) == code
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("stage", [True, False])
+def test_a_signal_that_a_library_swallows_stops_the_run_at_its_next_stage(
+    install: Install, tmp_path: Path, sent: signal.Signals, code: int, stage: bool
+) -> None:
+    """As an import does that catches all; a run without stages stops before it is written."""
+
+    def work(run: Run) -> None:
+        run.path("half.txt").write_text("half")
+        with contextlib.suppress(BaseException):
+            signal.raise_signal(sent)
+        if stage:
+            run.progress("next")
+            pytest.fail("the run went on")
+
+    install(work)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        got = _code_of(["probe", "--out", str(tmp_path / "out")])
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert got == code
+    assert list(tmp_path.iterdir()) == []
+
+
+def _code_of(arguments: list[str]) -> int:
+    try:
+        return main(arguments)
+    except SystemExit as left:
+        return int(str(left.code))
+
+
+def test_a_full_disk_is_said_and_nothing_stays(
+    install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(raising(OSError(errno.ENOSPC, "No space left on device")))
+    assert main(["probe", "--out", str(tmp_path / "out")]) == 2
+    assert "no room is left on the disk" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

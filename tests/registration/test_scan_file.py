@@ -379,6 +379,35 @@ def test_objects_of_an_obj_share_its_points_and_lose_none(tmp_path):
     assert not any("left out" in s for s in scan.said)
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_ply_of_triangles_quads_and_pentagons_is_read(tmp_path, order):
+    """Half of the tube's quads are whole, two a pentagon and a triangle; a flag before each face.
+
+    The file has the body's area; one that lost its end is refused.
+    """
+    points, triangles = body()
+    below, above = np.split(triangles, 2)  # p q r and p r s of each quad, around and then up
+    some = len(below) // 2
+    (p, q, r), s, (_, on, far) = below[0], above[0, 2], below[1]
+    faces = [[p, q, on, far, r], [p, r, s],
+             *np.column_stack([below[2:some], above[2:some, 2]]).tolist(),
+             *below[some:].tolist(), *above[some:].tolist()]  # fmt: skip
+    form = "little" if order == "<" else "big"
+    head = (f"ply\nformat binary_{form}_endian 1.0\nelement vertex {len(points)}\n"
+            "property double x\nproperty double y\nproperty double z\nproperty uchar red\n"
+            f"element face {len(faces)}\nproperty uchar flags\n"
+            "property list uchar int vertex_indices\nend_header\n")  # fmt: skip
+    rows = b"".join(struct.pack(order + "3dB", *p, 200) for p in points)
+    rows += b"".join(struct.pack(f"{order}BB{len(f)}i", 7, len(f), *f) for f in faces)
+    (file := tmp_path / "scan.ply").write_bytes(head.encode() + rows)
+    surface = read_scan(file).surface
+    assert len(surface.points) == len(points)
+    assert surface.areas.sum() == pytest.approx(Surface(points, triangles).areas.sum(), rel=1e-3)
+    file.write_bytes((head.encode() + rows)[:-9])
+    with pytest.raises(MeshError, match="save it as PLY again"):
+        read_scan(file)
+
+
 def test_a_cloud_with_few_triangles_stays_a_cloud(tmp_path):
     points, triangles = body()
     scan = read_scan(ply(tmp_path / "s.ply", points, triangles[:20]))

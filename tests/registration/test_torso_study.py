@@ -23,7 +23,7 @@ template = cache(torso)
 
 @cache
 def scan() -> SyntheticScan:
-    posture = random_posture(template(), "standing", 0)
+    posture = random_posture(template(), "standing", 2001)
     return synthetic_scan(template(), posture, 1, points=3000, noise=0.0)
 
 
@@ -97,7 +97,7 @@ def test_points_past_the_rim_are_told_apart():
 
 def test_frames_follow_each_other_closely():
     """Between two frames vertices move by 2 to 25 mm, all in one way by 5 mm and a little turn."""
-    case = torso_cases.Case("procedural", "procedural", "tilted", 0, 2e-3)
+    case = torso_cases.Case("procedural", "procedural", "tilted", 2001, 2e-3)
     known = {"procedural": template()}
     first = torso_cases.scan_of(case, known, points=2000)
     second = torso_cases.next_frame(case, known, first, points=2000)
@@ -122,6 +122,13 @@ def test_the_plan_crosses_templates_where_it_can():
     assert len(one) == 8
     assert {(c.scanned, c.fitted) for c in both} == set(torso_cases.PAIRS)
     assert len({c.key for c in both}) == len(both) == 2 * 4 * 4
+
+
+def test_the_study_draws_no_body_that_judges_or_sets_the_fit():
+    """The acceptance's are 0 to 99, those that weights and limits were chosen on 1000 to 1999."""
+    for known in ({"procedural": template()}, {"procedural": 0, "makehuman": 0}):
+        shapes = {case.shape for case in study.cases(3, known)}
+        assert shapes == {2001, 2002, 2003}
 
 
 @pytest.mark.parametrize("suffix", ["svg", "png"])
@@ -162,21 +169,21 @@ def test_no_point_of_a_figure_is_cut_off_and_each_pair_has_its_line(monkeypatch,
 @pytest.mark.slow
 def test_a_sweep_runs_and_more_noise_free_data_is_no_worse():
     """Landmarks 0 and 12 on one small scan of the template itself; a row each, all numbers."""
-    case = torso_cases.Case("procedural", "procedural", "standing", 0, 1e-3)
+    case = torso_cases.Case("procedural", "procedural", "standing", 2001, 1e-3)
     known = {"procedural": template()}
     levels = [level for level in study.levels(template()) if level.sweep == "landmarks"]
     rows = [study.row(case, scan(), known, level) for level in (levels[0], levels[-1])]
     assert [row["at"] for row in rows] == [0, 12]
     assert all(np.isfinite(row["surface_mm"]) for row in rows)
     assert rows[1]["landmark_mm"] <= rows[0]["landmark_mm"] + 0.5
-    assert replace(case, shape=1).key != case.key
+    assert replace(case, shape=2002).key != case.key
 
 
 @pytest.mark.slow
 def test_a_template_without_blendshapes_registers():
     """The first level of that sweep: bones alone reach the scan of a body within 2 cm."""
     known = {"procedural": template()}
-    case = torso_cases.Case("procedural", "procedural", "standing", 0, 1e-3)
+    case = torso_cases.Case("procedural", "procedural", "standing", 2001, 1e-3)
     level = next(x for x in study.levels(template()) if (x.sweep, x.at) == ("blendshapes", 0))
     found_row = study.row(case, scan(), known, level)
     assert 0.0 < found_row["surface_mm"] < 20.0

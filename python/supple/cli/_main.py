@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
-import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Sequence
 
 import click
 
 from .. import __version__
-from ..errors import SuppleError
+from ..errors import InputError, SuppleError
 from ._errors import exit_code, report
+from ._stop import cleanly_stopped
 
 INTERRUPTED = 130
-TERMINATED = 143
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class CommandFiles(click.Group):
@@ -62,29 +61,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run `supple` with these arguments (default: the process's) and return its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with _cleanly_terminated():
+        with cleanly_stopped():
             return int(supple.main(given, prog_name="supple", standalone_mode=False) or 0)
     except (SuppleError, click.ClickException) as error:
         report(error, as_json="--json" in given)
         return exit_code(error)
+    except OSError as problem:
+        if problem.errno not in _FULL:
+            raise
+        full = InputError("no room is left on the disk, so that nothing was written; make room, or "
+                          "choose another --out.")  # fmt: skip
+        report(full, as_json="--json" in given)
+        return exit_code(full)
     except (KeyboardInterrupt, click.Abort) as stop:
         click.echo(f"supple: {str(stop) or 'interrupted, nothing was written'}", err=True)
         return INTERRUPTED
-
-
-@contextmanager
-def _cleanly_terminated() -> Iterator[None]:
-    """A SIGTERM inside unwinds like an exception, so that unfinished output is removed."""
-
-    def leave(_signal: int, _frame: FrameType | None) -> None:
-        raise SystemExit(TERMINATED)
-
-    try:
-        before = signal.signal(signal.SIGTERM, leave)
-    except ValueError:  # not the main thread: signals are the host program's business
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -7,6 +7,8 @@ import threading
 import time
 from typing import TextIO
 
+from ._stop import go_on
+
 PATIENCE = 2.0
 """Seconds of silence before the line appears."""
 REPEAT = 10.0
@@ -32,6 +34,7 @@ class Progress:
 
     def __call__(self, stage: str, fraction: float | None = None) -> None:
         """`stage` begins, or goes on with `fraction` (0 to 1) of it done."""
+        go_on()
         self._stage, self._fraction = stage, fraction
 
     def __enter__(self) -> Progress:

@@ -14,6 +14,7 @@ from ._errors import NOT_TRUSTWORTHY
 from ._json import dumps
 from ._output import OutputFolder
 from ._progress import Progress
+from ._stop import go_on
 
 
 class Run:
@@ -102,6 +103,7 @@ class Run:
         return names
 
     def _finish(self) -> None:
+        go_on()
         if self._doubts:
             self.result["not_trustworthy"] = self._doubts
         if self._folder is not None:

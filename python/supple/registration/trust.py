@@ -98,9 +98,11 @@ def doubts(
             turns > limits.turns
         ),
     }
+    few = len(fit.used) < len(template.points)
+    finely = f", or give more than these {len(fit.used)} points of it" if few else ""
     for side, part in share.items():
         found[f"The scan shows {below(part)} of the {side} breast, less than {limits.seen:.0%}; "
-              "scan the front."] = part < limits.seen  # fmt: skip
+              f"scan the front{finely}."] = part < limits.seen  # fmt: skip
     return [text for text, holds in found.items() if holds]
 
 

@@ -78,14 +78,16 @@ def templates(data: Path | None = None) -> dict[str, Template]:
     return found
 
 
-def plan(shapes: int, names: Mapping[str, Any], noise_free: bool = True) -> Iterator[Case]:
-    """All shapes, pairs of the templates that are there, and poses.
+def plan(
+    shapes: int, names: Mapping[str, Any], noise_free: bool = True, first: int = 0
+) -> Iterator[Case]:
+    """All shapes from the number ``first`` on, pairs of the templates that are there, and poses.
 
     Noise-free too where a template is fitted to itself. Without another template the procedural
     one is fitted to itself.
     """
     pairs = [pair for pair in PAIRS if all(name in names for name in pair)]
-    for shape in range(shapes):
+    for shape in range(first, first + shapes):
         for scanned, fitted in pairs or [("procedural", "procedural")]:
             for pose in POSES:
                 yield Case(scanned, fitted, pose, shape, NOISE[shape % len(NOISE)])
