@@ -94,7 +94,8 @@ TEST(a_small_piece_beside_the_body_is_left_out_and_a_large_one_stays) {
   Points points(2260, 3);
   points << ball(2000, 0.3, Vec3::Zero(), 1), ball(200, 0.1, Vec3(1, 0, 0), 2),
       ball(60, 0.05, Vec3(0, 1, 0), 3);
-  const ScanCloud cloud = prepared(points, Triangles(0, 3), Points(0, 3), {0.03, true, 0.057});
+  const GivenTriangles::PlainObject none(0, 3);
+  const ScanCloud cloud = prepared(points, none, Points(0, 3), {0.03, true, 0.057});
   int body = 0, second = 0, third = 0;
   for (Index i = 0; i < cloud.points.rows(); ++i) {
     body += cloud.points.row(i).norm() < 0.31;
