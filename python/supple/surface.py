@@ -109,12 +109,12 @@ class Surface:
     @property
     def areas(self) -> Floats:
         """Area (t,) of each triangle, m²."""
-        return np.asarray(np.linalg.norm(_cross(self.points, self.triangles), axis=1) / 2)
+        return np.asarray(np.linalg.norm(area_vectors(self.points, self.triangles), axis=1) / 2)
 
     @property
     def normals(self) -> Floats:
         """Unit outward normal (t, 3) of each triangle."""
-        cross = _cross(self.points, self.triangles)
+        cross = area_vectors(self.points, self.triangles)
         return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
 
     def closest(self, points: npt.ArrayLike) -> Any:
@@ -155,7 +155,7 @@ def check_unit(extent: float, unit: str, source: object) -> None:
         )
 
 
-def _cross(points: Floats, triangles: Ints) -> Floats:
+def area_vectors(points: Floats, triangles: Ints) -> Floats:
     """Twice the area times the normal (t, 3) of each triangle."""
     return np.asarray(_crossed(*_two_edges(points, triangles)).T)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from supple.surface import area_vectors
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -20,12 +22,7 @@ def vertex_normals(points: Floats, triangles: Ints, smoothed: int = 0) -> Floats
         smoothed: how often to take the mean over each triangle, and of those again.
     """
     corners = np.ascontiguousarray(triangles.T)
-    x = np.ascontiguousarray(points.T)
-    a = x[:, corners[0]]
-    u, v = x[:, corners[1]] - a, x[:, corners[2]] - a
-    cross = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                      u[0] * v[1] - u[1] * v[0]])  # fmt: skip
-    normals = _gathered(cross, corners, len(points))
+    normals = _gathered(area_vectors(points, triangles).T, corners, len(points))
     for _ in range(smoothed):
         a, b, c = (normals[:, ids] for ids in corners)
         normals = _gathered(a + b + c, corners, len(points))

@@ -25,7 +25,7 @@ from supple.registration.posture import Posture
 from supple.registration.rest_landmarks import at_rest, grown
 from supple.registration.skin import edges, free_edges
 from supple.registration.template import Floats, Template
-from supple.surface import Surface
+from supple.surface import Surface, area_vectors
 
 #: s and the length of g, m; and the share ρ of the field that both sides have in common.
 _SIZE, _LENGTH, _COMMON = 12e-3, 80e-3, 0.8
@@ -89,17 +89,11 @@ def _over(
     triangles: npt.NDArray[np.int64], skin: Floats, moved: Floats
 ) -> npt.NDArray[np.bool_]:  # fmt: skip
     """Vertices (n,) of triangles of ``skin`` (n, 3) m that turn over or vanish once moved."""
-    before, after = (_areas(points, triangles) for points in (skin, moved))
+    before, after = (area_vectors(points, triangles) for points in (skin, moved))
     gone = (before * after).sum(axis=1) < _LEAST * (before**2).sum(axis=1)
     over = np.zeros(len(skin), dtype=bool)
     over[triangles[gone]] = True
     return over
-
-
-def _areas(points: Floats, triangles: npt.NDArray[np.int64]) -> Floats:
-    """Of triangles (t, 3), twice the area times the normal, m²."""
-    a, b, c = points[triangles.T]
-    return np.cross(b - a, c - a)
 
 
 @lru_cache(maxsize=16)
